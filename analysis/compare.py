@@ -1,0 +1,110 @@
+"""Two runs side by side: the same rows and methods, episode against episode."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from analysis.episodes import episodes_from_segments
+from analysis.rows import place_tasks
+from analysis.run import RunError, RunSpec, load_run
+from analysis.statistics import (
+    bootstrap_means,
+    count_scores,
+    generator,
+    interval,
+    paired_differences,
+    seed_means,
+)
+
+COLUMNS = [
+    "table", "row", "method", "score_a", "score_b", "difference", "ci_low", "ci_high",
+    "pairs", "seeds",
+]  # fmt: skip
+
+
+class NothingToCompareError(RunError):
+    """Two runs without one episode in common."""
+
+
+def compare(run_a: Path, run_b: Path) -> pd.DataFrame:
+    """COLUMNS, one row for each cell that both runs have; difference = a - b.
+
+    Everything is over the episodes (seed, task, episode) that both runs played, so `score_a` may
+    differ from the run's own table. Cells without a common episode are left out.
+    """
+    a, b = load_run(run_a), load_run(run_b)
+    episodes_a = episodes_from_segments(a.segments, a.spec)
+    episodes_b = episodes_from_segments(b.segments, b.spec)
+    key = ["method", "seed", "task", "episode"]
+    if episodes_a[key].merge(episodes_b[key], on=key).empty:
+        raise NothingToCompareError(_what_differs(a.spec, b.spec))
+    records = []
+    for entry in a.spec.tables:
+        places = place_tasks(a.spec, entry)
+        for (row, column), part in places.groupby(["row", "column"], sort=False):
+            nodes = part[["method", "task"]]
+            pairs = paired_differences(nodes.merge(episodes_a), nodes.merge(episodes_b))
+            if not pairs.empty:
+                rng = generator("compare", entry.id, str(row), str(column))
+                records.append((entry.id, row, column, *_difference(pairs, rng)))
+    return pd.DataFrame(records, columns=COLUMNS)
+
+
+def _difference(
+    pairs: pd.DataFrame, rng: np.random.Generator
+) -> tuple[float, float, float, float, float, int, int]:
+    seeds, tasks = pairs["seed"].to_numpy(), pairs["task"].to_numpy()
+    counts = {
+        name: count_scores(pairs[name].to_numpy(), seeds, tasks)
+        for name in ("score_first", "score_second", "difference")
+    }
+    score_a, score_b, difference = (float(seed_means(scores).mean()) for scores in counts.values())
+    low, high = interval(bootstrap_means(counts["difference"], rng))
+    return score_a, score_b, difference, low, high, len(pairs), len(np.unique(seeds))
+
+
+def _what_differs(a: RunSpec, b: RunSpec) -> str:
+    """Names the first reason why no episode is common, and what would help."""
+    for what, of_a, of_b in (
+        ("method", a.methods, b.methods),
+        ("seed", a.seeds, b.seeds),
+        ("task", a.tasks, b.tasks),
+    ):
+        if not set(of_a) & set(of_b):
+            return (
+                f"nothing to compare: {a.name} and {b.name} have no {what} in common "
+                f"({_some(of_a)} against {_some(of_b)})"
+            )
+    return (
+        f"nothing to compare: {a.name} and {b.name} have no finished episode in common; "
+        "resume the one that is incomplete"
+    )
+
+
+def _some(names: Iterable[object]) -> str:
+    shown = [str(name) for name in names]
+    return ", ".join(shown[:4]) + (", …" if len(shown) > 4 else "")
+
+
+def comparison_markdown(comparison: pd.DataFrame, name_a: str, name_b: str) -> str:
+    """The comparison as text, one table for each table of the runs."""
+    lines = [
+        f"# {name_a} against {name_b}",
+        "",
+        "Paired over the (seed, task, episode) both runs played; 95 % intervals from a "
+        "hierarchical bootstrap. A difference is marked “apart” if its interval leaves out zero.",
+    ]
+    for table, part in comparison.groupby("table", sort=False):
+        lines += ["", f"## {table}", "", f"| Task | Method | {name_a} | {name_b} | Difference | "
+                  "95 % interval | Pairs | Seeds | |", "|" + " --- |" * 9]  # fmt: skip
+        for cell in part.to_dict("records"):
+            apart = cell["ci_low"] > 0 or cell["ci_high"] < 0
+            lines.append(
+                f"| {cell['row']} | {cell['method']} | {cell['score_a']:.3f} | "
+                f"{cell['score_b']:.3f} | {cell['difference']:+.3f} | "
+                f"[{cell['ci_low']:+.3f}, {cell['ci_high']:+.3f}] | {cell['pairs']:,} | "
+                f"{cell['seeds']} | {'apart' if apart else ''} |"
+            )
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,137 @@
+"""From segments to episodes: reads the result of every task off the rollout tree.
+
+A task's episode is the walk g0, g0>g1, g0>g1>g2 through the tree. Nothing is simulated here: the
+tree was played to the longest step limit, and a shorter limit is applied by cutting afterwards.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from analysis.run import SEPARATOR, RunError, RunSpec, load_run, task_length
+
+COLUMNS = ["seed", "method", "task", "length", "episode", "accomplished", "score", "steps"]
+ABSENT, FAILED, SUCCEEDED = -1, 0, 1
+
+
+@dataclass(frozen=True)
+class _Nodes:
+    """All segments of one method as dense arrays, (prefixes, seeds, episodes)."""
+
+    outcome: np.ndarray  # ABSENT, FAILED or SUCCEEDED
+    end_step: np.ndarray  # steps of the episode up to the end of the segment
+
+
+def episodes_from_segments(segments: pd.DataFrame, spec: RunSpec) -> pd.DataFrame:
+    """One row per (method, task, seed, episode) whose result is known, in the spec's order.
+
+    Columns as in COLUMNS; score = accomplished / length. Episodes that were never played
+    (quarantined blocks, a run still under way) are left out, never taken for failures.
+    """
+    if segments.duplicated(["seed", "method", "prefix", "episode"]).any():
+        raise RunError("segments.parquet holds a segment twice: the run directory is damaged")
+    prefixes = _prefixes(spec.tasks)
+    lengths = sorted({task_length(task) for task in spec.tasks})
+    frames = []
+    for method in spec.methods:
+        nodes = _nodes_of_method(segments, method, prefixes, spec)
+        for length in lengths:
+            tasks = [task for task in spec.tasks if task_length(task) == length]
+            frames.append(_play(nodes, method, tasks, prefixes, spec))
+    return pd.concat(frames, ignore_index=True)
+
+
+def write_episodes(run_dir: Path) -> pd.DataFrame:
+    """Writes `episodes.parquet` of a run directory, and returns it."""
+    run = load_run(run_dir)
+    episodes = episodes_from_segments(run.segments, run.spec)
+    episodes.to_parquet(run_dir / "episodes.parquet", index=False)
+    return episodes
+
+
+def _prefixes(tasks: tuple[str, ...]) -> dict[str, int]:
+    """Every node that some task walks through -> its place in the dense arrays."""
+    numbered: dict[str, int] = {}
+    for task in tasks:
+        for prefix in _walk(task):
+            numbered.setdefault(prefix, len(numbered))
+    return numbered
+
+
+def _walk(task: str) -> list[str]:
+    skills = task.split(SEPARATOR)
+    return [SEPARATOR.join(skills[: depth + 1]) for depth in range(len(skills))]
+
+
+def _nodes_of_method(
+    segments: pd.DataFrame, method: str, prefixes: dict[str, int], spec: RunSpec
+) -> _Nodes:
+    """The method's segments, with the first skills it shares with all others.
+
+    The first skill comes before any stitching and is filed under method "". A method with other
+    policies (Single-Policy, another dataset level) has first skills of its own.
+    """
+    first = segments["depth"] == 1
+    own = segments["method"] == method
+    if method in spec.own_first_skill:
+        rows = segments[own]
+    elif (first & own).any():
+        raise RunError(
+            f'{method} has first skills of its own: mark it "own_first_skill": true in spec.json'
+        )
+    else:
+        rows = segments[(first & (segments["method"] == "")) | own]
+
+    node = rows["prefix"].map(prefixes).to_numpy(dtype=float)
+    seed = rows["seed"].map({seed: i for i, seed in enumerate(spec.seeds)}).to_numpy(dtype=float)
+    episode = rows["episode"].to_numpy()
+    asked = ~np.isnan(node) & ~np.isnan(seed) & (episode < spec.episodes)
+    place = node[asked].astype(int), seed[asked].astype(int), episode[asked]
+
+    shape = (len(prefixes), len(spec.seeds), spec.episodes)
+    outcome = np.full(shape, ABSENT, dtype=np.int8)
+    end_step = np.zeros(shape, dtype=np.int64)
+    outcome[place] = rows["success"].to_numpy(dtype=bool)[asked]
+    end_step[place] = rows["end_step"].to_numpy()[asked]
+    return _Nodes(outcome, end_step)
+
+
+def _play(
+    nodes: _Nodes, method: str, tasks: list[str], prefixes: dict[str, int], spec: RunSpec
+) -> pd.DataFrame:
+    """Walks all tasks of one length at once; arrays are (tasks, seeds, episodes)."""
+    length = task_length(tasks[0])
+    limit = spec.step_limits[length]
+    walks = np.array([[prefixes[prefix] for prefix in _walk(task)] for task in tasks])
+
+    shape = (len(tasks), len(spec.seeds), spec.episodes)
+    accomplished = np.zeros(shape, dtype=np.int64)
+    steps = np.zeros(shape, dtype=np.int64)
+    going_on = np.ones(shape, dtype=bool)  # every skill so far accomplished, within the limit
+    known = np.ones(shape, dtype=bool)
+    for depth in range(length):
+        outcome = nodes.outcome[walks[:, depth]]
+        end_step = nodes.end_step[walks[:, depth]]
+        # With no step left there may be no next segment, and the result is known without it.
+        known &= ~(going_on & (outcome == ABSENT) & (steps < limit))
+        played = going_on & (outcome != ABSENT)
+        steps = np.where(played, np.minimum(end_step, limit), steps)
+        going_on = played & (outcome == SUCCEEDED) & (end_step <= limit)
+        accomplished += going_on
+
+    task, seed, episode = np.nonzero(known)
+    return pd.DataFrame(
+        {
+            "seed": np.array(spec.seeds, dtype=np.int64)[seed],
+            "method": method,
+            "task": np.array(tasks, dtype=object)[task],
+            "length": length,
+            "episode": episode,
+            "accomplished": accomplished[known],
+            "score": accomplished[known] / length,
+            "steps": steps[known],
+        },
+        columns=COLUMNS,
+    )

@@ -1,0 +1,48 @@
+"""Which second skill works after which first: one matrix a method."""
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from analysis.figures.style import INK, new_figure
+from analysis.run import SEPARATOR, RunSpec
+
+
+def pair_rates(segments: pd.DataFrame, spec: RunSpec, method: str) -> np.ndarray:
+    """(first, second) success rate of the second skill given the first's; NaN if never tried."""
+    limit = spec.step_limits.get(2, np.inf)
+    seconds = segments[(segments["depth"] == 2) & (segments["method"] == method)]
+    success = seconds["success"].astype(bool) & (seconds["end_step"] <= limit)
+    rates = success.groupby(seconds["prefix"]).mean()
+    pairs = [[SEPARATOR.join((first, second)) for second in spec.skills] for first in spec.skills]
+    return np.array([[rates.get(pair, np.nan) for pair in row] for row in pairs], dtype=float)
+
+
+def draw_pairs(segments: pd.DataFrame, spec: RunSpec, methods: tuple[str, str]) -> Figure:
+    """Two matrices side by side, rows the first skill, columns the second."""
+    names = [spec.skill_label(skill) for skill in spec.skills]
+    size = 1.3 + 0.46 * len(names)
+    figure = new_figure(2 * size + 1.2, size + 0.6)
+    panels = figure.subplots(1, 2)
+    for axes, method in zip(panels, methods, strict=True):
+        rates = pair_rates(segments, spec, method)
+        image = axes.imshow(rates, vmin=0, vmax=1, cmap="cividis")
+        for (row, column), rate in np.ndenumerate(rates):
+            dark = rate < 0.5
+            text = "" if np.isnan(rate) else f"{rate:.2f}"
+            axes.text(column, row, text, ha="center", va="center", fontsize=7.5,
+                      color="white" if dark else INK)  # fmt: skip
+        axes.set_title(spec.methods[method])
+        axes.set_xticks(range(len(names)), names)
+        if max(map(len, names)) > 4:
+            axes.tick_params(axis="x", labelrotation=40)
+            for label in axes.get_xticklabels():
+                label.set(ha="right", rotation_mode="anchor")
+        axes.set_yticks(range(len(names)), names if axes is panels[0] else [])
+        axes.tick_params(length=0)
+        axes.spines[:].set_visible(False)
+        axes.set_xlabel("second skill")
+    panels[0].set_ylabel("first skill, accomplished")
+    bar = figure.colorbar(image, ax=panels, shrink=0.8, label="success of the second skill")
+    bar.outline.set_visible(False)
+    return figure

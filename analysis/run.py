@@ -1,0 +1,134 @@
+"""A finished (or half-finished) run directory, read into memory.
+
+The orchestrator writes these files; this module is the only place that knows their names.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+SEPARATOR = ">"
+"""Joins the skills of a task or prefix: "g0>g1"."""
+
+VARIANT = "@"
+"""Joins a method and what it was trained on: "mb-stitch@level-1" (Table 5)."""
+
+
+class RunError(ValueError):
+    """A run directory that cannot be reported on; the message says what to do."""
+
+
+@dataclass(frozen=True)
+class TableEntry:
+    """One table a run is to be shown as."""
+
+    id: str
+    paper: str  # the paper's number of this table; "" if it has none
+    rows: str  # a name in analysis.rows.ROW_RULES
+    title: str
+    noun: str = "skills"  # of row labels such as "2 goals"
+    baseline: str = ""  # gains of all others over this method; default: last over all others
+
+
+@dataclass(frozen=True)
+class RunSpec:
+    """What was asked of a run: the part of `spec.json` that its tables depend on."""
+
+    name: str
+    title: str
+    benchmark: str
+    scale: str
+    skills: tuple[str, ...]
+    methods: Mapping[str, str]  # name -> label, in the order of the columns
+    seeds: tuple[int, ...]
+    episodes: int  # per task, method and seed
+    tasks: tuple[str, ...]
+    step_limits: Mapping[int, int]  # task length -> steps of a whole task
+    tables: tuple[TableEntry, ...]
+    skill_labels: Mapping[str, str] = field(default_factory=dict)
+    own_first_skill: frozenset[str] = frozenset()  # methods whose first skill nobody shares
+
+    @classmethod
+    def from_dict(cls, spec: Mapping[str, Any]) -> "RunSpec":
+        """Reads the resolved spec; keys that no table depends on are left alone."""
+        try:
+            return cls(
+                name=spec["name"],
+                title=spec.get("title", spec["name"]),
+                benchmark=spec["benchmark"],
+                scale=spec["scale"],
+                skills=tuple(spec["skills"]),
+                methods={m["name"]: m.get("label", m["name"]) for m in spec["methods"]},
+                seeds=tuple(spec["seeds"]),
+                episodes=spec["episodes"],
+                tasks=tuple(spec["tasks"]),
+                step_limits={int(n): limit for n, limit in spec["step_limits"].items()},
+                tables=tuple(_table_entry(entry) for entry in spec["tables"]),
+                skill_labels=spec.get("skill_labels", {}),
+                own_first_skill=frozenset(
+                    m["name"] for m in spec["methods"] if m.get("own_first_skill", False)
+                ),
+            )
+        except KeyError as missing:
+            raise RunError(f"spec.json has no {missing}: another version wrote it") from None
+
+    def skill_label(self, skill: str) -> str:
+        """The name a skill goes by in tables: "bottom-burner" -> "bottom burner"."""
+        return self.skill_labels.get(skill, skill.replace("_", " ").replace("-", " "))
+
+    def task_label(self, task: str) -> str:
+        """The name a task goes by in tables: "g0>g1" -> "g0 → g1"."""
+        return " → ".join(self.skill_label(skill) for skill in task.split(SEPARATOR))
+
+
+def _table_entry(entry: Mapping[str, Any]) -> TableEntry:
+    known = TableEntry.__dataclass_fields__
+    return TableEntry(**{name: value for name, value in entry.items() if name in known})
+
+
+def task_length(task: str) -> int:
+    return task.count(SEPARATOR) + 1
+
+
+@dataclass(frozen=True)
+class Run:
+    """Everything a report needs. Optional files that are absent read as empty."""
+
+    spec: RunSpec
+    segments: pd.DataFrame
+    provenance: dict[str, Any]
+    quarantine: list[dict[str, Any]]
+    training: list[dict[str, Any]]
+    showcase: dict[str, Any]
+
+
+def load_run(run_dir: Path) -> Run:
+    """Reads a run directory, or says what it lacks."""
+    segments = run_dir / "segments.parquet"
+    for needed in (run_dir / "spec.json", segments):
+        if not needed.is_file():
+            raise RunError(
+                f"no {needed.name} in {run_dir}: give the directory of a run that has finished "
+                "at least one block"
+            )
+    return Run(
+        spec=RunSpec.from_dict(_read_json(run_dir / "spec.json", {})),
+        segments=pd.read_parquet(segments),
+        provenance=_read_json(run_dir / "provenance.json", {}),
+        quarantine=_read_json(run_dir / "quarantine.json", []),
+        training=_read_json(run_dir / "training.json", []),
+        showcase=_read_json(run_dir / "showcase.json", {}),
+    )
+
+
+def _read_json(path: Path, default: Any) -> Any:
+    if not path.is_file():
+        return default
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except json.JSONDecodeError as error:
+        raise RunError(f"{path} is not valid JSON ({error}): run the same command again") from None

@@ -1,0 +1,176 @@
+"""A table of a run: every cell's score, and the gains of one method over another."""
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from analysis.paper import paper_scores
+from analysis.rows import column_labels, place_tasks
+from analysis.run import RunSpec, TableEntry
+from analysis.statistics import (
+    bootstrap_means,
+    count_scores,
+    estimate,
+    generator,
+    interval,
+    paired_differences,
+    seed_means,
+)
+
+SCORE_COLUMNS = [
+    "row", "method", "score", "variance", "std", "ci_low", "ci_high", "episodes", "seeds",
+    "paper_score", "paper_error",
+]  # fmt: skip
+GAIN_COLUMNS = [
+    "row", "method", "baseline", "gain", "ci_low", "ci_high", "relative_gain", "pairs", "seeds",
+]  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table with all that is printed beside it."""
+
+    spec: RunSpec
+    entry: TableEntry
+    scores: pd.DataFrame  # SCORE_COLUMNS, one row a cell
+    gains: pd.DataFrame  # GAIN_COLUMNS
+    leads: pd.DataFrame  # GAIN_COLUMNS: the paper's leader of each row over the best other here
+    expected: dict[tuple[str, str], int]  # (row, method) -> episodes of a complete cell
+    labels: dict[str, str]  # method -> how the table's head calls it
+
+    @property
+    def rows(self) -> list[str]:
+        return list(dict.fromkeys(self.scores["row"]))
+
+    @property
+    def methods(self) -> list[str]:
+        return list(dict.fromkeys(self.scores["method"]))
+
+    @property
+    def missing(self) -> dict[tuple[str, str], int]:
+        """(row, method) -> episodes that are asked for and not there, where there are any."""
+        played = self.scores.set_index(["row", "method"])["episodes"]
+        short = {cell: asked - int(played[cell]) for cell, asked in self.expected.items()}
+        return {cell: episodes for cell, episodes in short.items() if episodes > 0}
+
+
+def build_table(episodes: pd.DataFrame, spec: RunSpec, entry: TableEntry) -> Table:
+    """Gathers episodes into cells, and compares the methods within each row."""
+    places = place_tasks(spec, entry)
+    cells = _cells(episodes, places)
+    scores = score_table(cells, entry)
+    tasks_of_cell = Counter(zip(places["row"], places["column"], strict=True))
+    labels = column_labels(spec)
+    gain_pairs, lead_pairs = _gain_pairs(cells, entry), _lead_pairs(scores)
+    # Most leads are gains as well: each is worked out once.
+    gains = gain_table(cells, list(dict.fromkeys(gain_pairs + lead_pairs)), entry)
+    return Table(
+        spec=spec,
+        entry=entry,
+        scores=scores,
+        gains=_only(gains, gain_pairs),
+        leads=_only(gains, lead_pairs),
+        expected={
+            cell: tasks * len(spec.seeds) * spec.episodes for cell, tasks in tasks_of_cell.items()
+        },
+        labels={method: labels.get(method, method) for method in scores["method"].unique()},
+    )
+
+
+Cells = dict[tuple[str, str], pd.DataFrame]
+"""(row, method) -> its episodes; rows and methods in the table's order."""
+
+
+def _cells(episodes: pd.DataFrame, places: pd.DataFrame) -> Cells:
+    by_node = dict(list(episodes.groupby(["method", "task"], sort=False)))
+    nothing = episodes.iloc[:0]
+    parts: dict[tuple[str, str], list[pd.DataFrame]] = {}
+    for place in places.to_dict("records"):
+        node = (place["method"], place["task"])
+        parts.setdefault((place["row"], place["column"]), []).append(by_node.get(node, nothing))
+    return {cell: pd.concat(played) for cell, played in parts.items()}
+
+
+def score_table(cells: Cells, entry: TableEntry) -> pd.DataFrame:
+    """SCORE_COLUMNS: each cell's estimate beside the paper's number, NaN where it has none."""
+    paper = paper_scores(entry.paper)
+    records = []
+    for (row, method), played in cells.items():
+        counts = count_scores(
+            played["score"].to_numpy(), played["seed"].to_numpy(), played["task"].to_numpy()
+        )
+        ours = estimate(counts, generator("score", entry.id, row, method))
+        records.append(
+            (row, method, ours.mean, ours.variance, ours.std, ours.low, ours.high,
+             ours.episodes, ours.seeds, *paper.get((row, method), (np.nan, np.nan)))
+        )  # fmt: skip
+    return pd.DataFrame(records, columns=SCORE_COLUMNS)
+
+
+def gain_table(cells: Cells, pairs: list[tuple[str, str, str]], entry: TableEntry) -> pd.DataFrame:
+    """GAIN_COLUMNS for each (row, method, baseline), over the episodes both have."""
+    records = []
+    for row, method, baseline in pairs:
+        gain = paired_gain(
+            cells[row, method],
+            cells[row, baseline],
+            generator("gain", entry.id, row, method, baseline),
+        )
+        records.append((row, method, baseline, *gain))
+    return pd.DataFrame(records, columns=GAIN_COLUMNS)
+
+
+def _only(gains: pd.DataFrame, pairs: list[tuple[str, str, str]]) -> pd.DataFrame:
+    """The lines of these (row, method, baseline), in this order."""
+    by_pair = {gain[:3]: gain for gain in gains.itertuples(index=False, name=None)}
+    return pd.DataFrame([by_pair[pair] for pair in pairs], columns=GAIN_COLUMNS)
+
+
+def paired_gain(
+    first: pd.DataFrame, second: pd.DataFrame, rng: np.random.Generator
+) -> tuple[float, float, float, float, int, int]:
+    """(gain, ci_low, ci_high, relative_gain, pairs, seeds) of the first over the second.
+
+    The relative gain is to the second's score over the same episodes; NaN if that is zero.
+    """
+    pairs = paired_differences(first, second)
+    if pairs.empty:
+        return np.nan, np.nan, np.nan, np.nan, 0, 0
+    seeds, tasks = pairs["seed"].to_numpy(), pairs["task"].to_numpy()
+    differences = count_scores(pairs["difference"].to_numpy(), seeds, tasks)
+    gain = float(seed_means(differences).mean())
+    low, high = interval(bootstrap_means(differences, rng))
+    base = float(seed_means(count_scores(pairs["score_second"].to_numpy(), seeds, tasks)).mean())
+    relative = gain / base if base > 0 else np.nan
+    return gain, low, high, relative, len(pairs), len(differences.counts)
+
+
+def _gain_pairs(cells: Cells, entry: TableEntry) -> list[tuple[str, str, str]]:
+    """The last method over each other; or, given a baseline, each other method over it."""
+    methods = list(dict.fromkeys(method for _, method in cells))
+    if entry.baseline:
+        duels = [(method, entry.baseline) for method in methods if method != entry.baseline]
+    else:
+        duels = [(methods[-1], method) for method in methods[:-1]]
+    rows = dict.fromkeys(row for row, _ in cells)
+    return [
+        (row, *duel)
+        for row in rows
+        for duel in duels
+        if all((row, method) in cells for method in duel)
+    ]
+
+
+def _lead_pairs(scores: pd.DataFrame) -> list[tuple[str, str, str]]:
+    """(row, the paper's leader, the best of the others here); rows the paper ties are left out."""
+    pairs = []
+    for row, part in scores.groupby("row", sort=False):
+        printed = part["paper_score"]
+        leaders = part.loc[printed == printed.max(), "method"].tolist()
+        others = part[~part["method"].isin(leaders)].dropna(subset="score")
+        if len(leaders) == 1 and not others.empty:
+            rival = others["method"].iloc[int(others["score"].argmax())]
+            pairs.append((str(row), leaders[0], rival))
+    return pairs

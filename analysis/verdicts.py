@@ -1,0 +1,137 @@
+"""Does a run agree with the paper? Cell by cell, and claim by claim."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from analysis.paper import HALF_DIGIT, accomplished_skills, paper_table
+from analysis.tables import Table
+
+NEAR = 0.05
+"""Scores this close agree whatever the interval: environments, data and seeds are not the same."""
+
+SAME_SKILLS = 0.1
+"""Numbers of accomplished skills this close count as constant over task lengths."""
+
+SAME_ERROR = 0.001
+"""A printed ± matches ours up to one unit of its last digit."""
+
+AGREES, HIGHER, LOWER, NO_DATA, NOT_PRINTED = "agrees", "higher", "lower", "no data", "not in paper"
+HOLDS, UNDECIDED, FAILS = "holds", "undecided", "fails"
+
+EXPLANATION = (
+    f"“{AGREES}”: the paper's score lies in our 95 % interval or within {NEAR} of our score; "
+    f"otherwise “{HIGHER}” or “{LOWER}” says where ours is. A claim “{HOLDS}” if its 95 % "
+    f"interval lies wholly on its side of zero, “{FAILS}” if wholly on the other, and is "
+    f"“{UNDECIDED}” if the interval contains zero."
+)
+
+
+@dataclass(frozen=True)
+class Claim:
+    """Something the paper's table says, and whether the run says it too."""
+
+    text: str
+    verdict: str  # HOLDS, UNDECIDED, FAILS or NO_DATA
+    detail: str
+
+
+def cell_verdict(score: float, low: float, high: float, paper_score: float) -> str:
+    """How our score stands to the paper's."""
+    if np.isnan(score):
+        return NO_DATA
+    if np.isnan(paper_score):
+        return NOT_PRINTED
+    # The comparison is one of decimals: 0.05 apart must not depend on binary rounding.
+    if low <= paper_score <= high or abs(score - paper_score) <= NEAR + 1e-9:
+        return AGREES
+    return HIGHER if score > paper_score else LOWER
+
+
+def cell_verdicts(scores: pd.DataFrame) -> list[str]:
+    """One verdict for each row of a score table."""
+    columns = scores[["score", "ci_low", "ci_high", "paper_score"]].to_numpy(dtype=float)
+    return [cell_verdict(*cell) for cell in columns]
+
+
+def claims(table: Table) -> list[Claim]:
+    """All claims of the paper's table that the run can speak to."""
+    return [*_leads(table), *_constant_skills(table)]
+
+
+def _leads(table: Table) -> list[Claim]:
+    """The paper's best method of each row is the best here, too."""
+    found = []
+    for lead in table.leads.to_dict("records"):
+        leader, rival = table.labels[lead["method"]], table.labels[lead["baseline"]]
+        if lead["pairs"] == 0:
+            verdict, detail = NO_DATA, "no episode played by both"
+        else:
+            verdict = _side(lead["ci_low"], lead["ci_high"])
+            detail = (
+                f"{lead['gain']:+.3f} [{lead['ci_low']:+.3f}, {lead['ci_high']:+.3f}] over "
+                f"{rival}, the best other method here "
+                f"({_seeds(lead['seeds'])}, {lead['pairs']:,} paired episodes)"
+            )
+        found.append(Claim(f"{leader} leads “{lead['row']}”", verdict, detail))
+    return found
+
+
+def _side(low: float, high: float) -> str:
+    if low > 0:
+        return HOLDS
+    return FAILS if high < 0 else UNDECIDED
+
+
+def _seeds(count: int) -> str:
+    return f"{count} seed" if count == 1 else f"{count} seeds"
+
+
+def _constant_skills(table: Table) -> list[Claim]:
+    """No-Stitch accomplishes as many skills however long the task: claimed where the paper's does.
+
+    Table 1: 0.584·2 = 0.389·3 = 0.292·4 up to rounding, since the third skill is never reached.
+    """
+    method = "no-stitch"
+    if table.entry.rows != "length" or paper_table(table.entry.paper).empty:
+        return []
+    printed = accomplished_skills(table.entry.paper, method)
+    rounding = 2 * HALF_DIGIT * max(int(row.split()[0]) for row in printed.index)
+    if np.ptp(printed) > rounding:
+        return []
+    cells = table.scores.query("method == @method").set_index("row")["score"]
+    ours = cells * [int(row.split()[0]) for row in cells.index]
+    text = f"{table.labels[method]} accomplishes the same number of skills at every length"
+    if ours.isna().any() or len(ours) < 2:
+        return [Claim(text, NO_DATA, "needs at least two lengths")]
+    detail = ", ".join(f"{skills:.3f} in {row}" for row, skills in ours.items())
+    constant = np.ptp(ours) <= SAME_SKILLS
+    return [
+        Claim(
+            text,
+            HOLDS if constant else FAILS,
+            f"{detail}; spread {np.ptp(ours):.3f}, at most {SAME_SKILLS} counts as constant "
+            f"(paper: {printed.min():.3f} to {printed.max():.3f})",
+        )
+    ]
+
+
+def error_reading(scores: pd.DataFrame) -> str:
+    """Which reading of the paper's ± our own spread over seeds matches better, in a sentence."""
+    cells = scores.dropna(subset=["score", "paper_error"])
+    if cells.empty:
+        return ""
+    if (cells["seeds"] < 2).all():
+        return "One seed: there is no spread over seeds to compare the paper's ± with."
+    variance, std = (
+        int((abs(cells[kind].round(3) - cells["paper_error"]) <= SAME_ERROR + 1e-9).sum())
+        for kind in ("variance", "std")
+    )
+    better = "the variance" if variance > std else "the standard deviation"
+    verdict = "both equally well" if variance == std else f"{better} better"
+    return (
+        f"The paper's ± is within {SAME_ERROR} of our variance over seeds in {variance} of "
+        f"{len(cells)} cells and of our standard deviation in {std}: it matches {verdict}. "
+        "(The paper calls it variance. Both are taken with ddof = 0.)"
+    )

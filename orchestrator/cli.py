@@ -1,0 +1,265 @@
+"""The front door: `skillstitch plan | run | status | report | compare | doctor | gc`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+from rich.console import Console
+
+from orchestrator.errors import IncompleteError, SkillstitchError, UsageError
+from orchestrator.executors import ExecutorKind
+from orchestrator.spec import Spec, load_spec, packaged_specs
+
+INTERRUPTED = 130
+ERRORS = Console(stderr=True, highlight=False)
+OUTPUT = Console(highlight=False)
+
+OfSpec = Annotated[Spec, tyro.conf.arg(name="")]  # spec fields are options of the command itself
+
+
+@dataclass(frozen=True)
+class PlanCommand:
+    """What a spec would train and simulate, and what that costs. Runs nothing."""
+
+    spec: OfSpec
+    store: Path = Path("runs/store")  # where artifacts and finished blocks are kept
+    workers: int | None = None  # to estimate the time for; default: all cores
+
+
+@dataclass(frozen=True)
+class RunCommand:
+    """Carry a spec out, or go on where it was interrupted; ends with tables and report."""
+
+    spec: OfSpec
+    out: Path | None = None  # run directory; default: runs/<name>-<scale>
+    store: Path = Path("runs/store")  # where artifacts and finished blocks are kept
+    executor: ExecutorKind = "ray"  # serial: everything in this process
+    workers: int | None = None  # default: all cores, or all of the cluster's
+    address: str | None = None  # of a Ray cluster to join, e.g. 10.0.0.1:6379 or auto
+    tracking_uri: str | None = None  # MLflow; default: SQLite beside the store; none: off
+    results: Path | None = None  # also export each table to RESULTS/<table>/
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Entry point; exits with 0, or the code of the error (see `orchestrator.errors`)."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        _dispatch(words)
+    except SkillstitchError as error:
+        ERRORS.print(f"error: {error}", markup=False)
+        sys.exit(error.exit_code)
+    except KeyboardInterrupt:
+        ERRORS.print("interrupted; the same command resumes", markup=False)
+        sys.exit(INTERRUPTED)
+
+
+def _dispatch(words: list[str]) -> None:
+    name, rest = (words[0], words[1:]) if words else ("--help", [])
+    if name in ("-h", "--help"):
+        OUTPUT.print(_usage(), markup=False)
+        return
+    if name not in COMMANDS:
+        raise UsageError(f"unknown command {name!r}; there are {', '.join(COMMANDS)}")
+    COMMANDS[name][0](rest)
+
+
+def _usage() -> str:
+    lines = [f"  {name:<9}{summary}" for name, (_, summary) in COMMANDS.items()]
+    return "\n".join(
+        [
+            "usage: skillstitch COMMAND ...",
+            "",
+            "Reproduces and extends Offline Model-Based Skill Stitching.",
+            "",
+            *lines,
+            "",
+            f"Specs: {', '.join(packaged_specs())}, or a TOML file. "
+            "COMMAND --help tells the options.",
+        ]
+    )
+
+
+def _with_spec(command: type[Any], name: str, words: list[str]) -> Any:
+    """Parse `SPEC [options]`; every field of the spec is an option, its default the spec's own."""
+    program = f"skillstitch {name} SPEC"
+    if not words or words[0].startswith("-"):
+        if words and words[0] in ("-h", "--help"):
+            words = [packaged_specs()[0], "--help"]
+        else:
+            raise UsageError(f"skillstitch {name} needs a spec: {', '.join(packaged_specs())}")
+    scale = "paper"
+    for word, following in zip(words, [*words[1:], ""], strict=True):
+        if word == "--scale":
+            scale = following
+        elif word.startswith("--scale="):
+            scale = word.partition("=")[2]
+    default = command(load_spec(words[0], scale))
+    return tyro.cli(command, default=default, args=words[1:], prog=program)
+
+
+def _plan(words: list[str]) -> None:
+    from orchestrator.costs import estimate
+    from orchestrator.ledger import Ledger
+    from orchestrator.plan import make_plan
+    from orchestrator.printing import plan_lines
+    from orchestrator.store import Store
+
+    command = _with_spec(PlanCommand, "plan", words)
+    plan = make_plan(command.spec)
+    costs = estimate(plan, Store(command.store), Ledger(command.store / "blocks.sqlite"))
+    for line in plan_lines(command.spec, costs, command.workers):
+        OUTPUT.print(line, markup=False)
+
+
+def _run(words: list[str]) -> None:
+    from orchestrator.printing import summary_lines
+    from orchestrator.progress import ConsoleProgress
+    from orchestrator.reproduce import Settings, reproduce
+    from orchestrator.rundir import RunDirectory, default_out
+
+    command: RunCommand = _with_spec(RunCommand, "run", words)
+    out = command.out or default_out(command.spec)
+    settings = Settings(
+        out,
+        command.store,
+        command.executor,
+        command.workers,
+        command.address,
+        command.tracking_uri,
+    )
+    incomplete = None
+    with ConsoleProgress(ERRORS) as progress:
+        try:
+            reproduce(command.spec, settings, progress)
+        except IncompleteError as error:
+            if not (out / "report" / "index.html").is_file():
+                raise
+            incomplete = error
+    if command.results is not None:
+        _export(out, command.results)
+    for line in summary_lines(RunDirectory(out)):
+        OUTPUT.print(line, markup=False, soft_wrap=True)
+    if incomplete is not None:
+        raise incomplete
+
+
+def _export(run: Path, results: Path) -> None:
+    from analysis.report import export_results
+
+    for folder in export_results(run, results):
+        OUTPUT.print(f"exported {folder}", markup=False)
+
+
+def _status(words: list[str]) -> None:
+    from orchestrator.printing import status_lines
+    from orchestrator.reproduce import catch_up
+    from orchestrator.rundir import RunDirectory
+
+    def status(run: tyro.conf.Positional[Path], store: Path = Path("runs/store")) -> None:
+        """How far a run directory is.
+
+        Args:
+            run: the run directory.
+            store: where its artifacts are kept.
+        """
+        for line in status_lines(RunDirectory(run), store):
+            OUTPUT.print(line, markup=False)
+        if trouble := catch_up(RunDirectory(run)):
+            ERRORS.print(f"tracking: {trouble}", markup=False)
+
+    tyro.cli(status, args=words, prog="skillstitch status")
+
+
+def _report(words: list[str]) -> None:
+    from analysis.report import build_report
+    from orchestrator.reproduce import catch_up
+    from orchestrator.rundir import RunDirectory
+
+    def report(run: tyro.conf.Positional[Path], results: Path | None = None) -> None:
+        """Write a run's tables, figures and report again from its segments.
+
+        Args:
+            run: the run directory.
+            results: also export each table to RESULTS/<table>/.
+        """
+        RunDirectory(run).spec()  # a clear error where there is no run
+        OUTPUT.print(f"wrote {build_report(run)}", markup=False)
+        if results is not None:
+            _export(run, results)
+        if trouble := catch_up(RunDirectory(run)):
+            ERRORS.print(f"tracking: {trouble}", markup=False)
+
+    tyro.cli(report, args=words, prog="skillstitch report")
+
+
+def _compare(words: list[str]) -> None:
+    from analysis.compare import compare, comparison_markdown
+
+    def both(run_a: tyro.conf.Positional[Path], run_b: tyro.conf.Positional[Path]) -> None:
+        """Two runs side by side, paired on the episodes that both played.
+
+        Args:
+            run_a: a run directory.
+            run_b: another; differences are B − A.
+        """
+        text = comparison_markdown(compare(run_a, run_b), run_a.name, run_b.name)
+        OUTPUT.print(text, markup=False, soft_wrap=True)
+
+    tyro.cli(both, args=words, prog="skillstitch compare")
+
+
+def _doctor(words: list[str]) -> None:
+    from orchestrator.doctor import diagnose, render
+
+    def doctor(root: Path = Path("runs")) -> None:
+        """Check this machine and the installation, with a one-second self test.
+
+        Args:
+            root: where runs are to be kept.
+        """
+        findings = diagnose(root)
+        OUTPUT.print(render(findings))
+        if any(finding.status == "fault" for finding in findings):
+            sys.exit(1)
+
+    tyro.cli(doctor, args=words, prog="skillstitch doctor")
+
+
+def _gc(words: list[str]) -> None:
+    from orchestrator.gc import collect_garbage
+
+    def gc(
+        runs: tyro.conf.Positional[tuple[Path, ...]],
+        store: Path = Path("runs/store"),
+        delete: bool = False,
+    ) -> None:
+        """Find artifacts and blocks that none of the given run directories needs.
+
+        Args:
+            runs: run directories whose artifacts and blocks are to be kept.
+            store: the store to clean.
+            delete: delete what was found; without it, nothing is touched.
+        """
+        for line in collect_garbage(store, runs, delete=delete):
+            OUTPUT.print(line, markup=False)
+
+    tyro.cli(gc, args=words, prog="skillstitch gc")
+
+
+COMMANDS: dict[str, tuple[Callable[[list[str]], None], str]] = {
+    "plan": (_plan, "what a spec would train and simulate, and what that costs"),
+    "run": (_run, "carry a spec out, or resume it; ends with tables and report"),
+    "status": (_status, "how far a run directory is"),
+    "report": (_report, "write a run's report again, and export its tables"),
+    "compare": (_compare, "two runs side by side, paired"),
+    "doctor": (_doctor, "check this machine and the installation"),
+    "gc": (_gc, "delete artifacts and blocks that no run directory needs"),
+}
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,309 @@
+"""The driver: from a plan to a finished ledger. It alone writes."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from orchestrator.errors import BadDataError, ChangedError, IncompleteError
+from orchestrator.executors.protocol import Executor
+from orchestrator.jobs import BlockReport, BlockTask, BuildJob, PlayJob, Report
+from orchestrator.ledger import Ledger, Outcome
+from orchestrator.plan import Node, Plan
+from orchestrator.recipes import Recipe
+from orchestrator.store import CorruptArtifactError, Store
+
+ATTEMPTS = 3  # of one job, before it is given up
+LARGEST_BUNDLE = 64  # blocks sent to a worker at once
+
+
+class Progress(Protocol):
+    """Is told how far the work is; draws it for a person."""
+
+    def phase(self, name: str, total: int, done: int) -> None: ...
+
+    def advance(self, count: int = 1) -> None: ...
+
+    def say(self, message: str) -> None: ...
+
+
+class Silent:
+    """Progress for tests and benchmarks."""
+
+    def phase(self, name: str, total: int, done: int) -> None: ...
+
+    def advance(self, count: int = 1) -> None: ...
+
+    def say(self, message: str) -> None: ...
+
+
+def verified_artifacts(plan: Plan, store: Store, ledger: Ledger, progress: Progress) -> set[str]:
+    """Keys of the plan's artifacts that are in the store and whole.
+
+    A damaged one is named, set aside and counts as missing. Raises ChangedError when a whole one
+    is not the one that this run's blocks were played with.
+    """
+    whole = set()
+    for key, recipe in plan.recipes.items():
+        if (recipe.kind, key) not in store:
+            continue
+        try:
+            digest = store.read(recipe.kind, key).digest
+        except CorruptArtifactError as error:
+            aside = store.discard(recipe.kind, key)
+            progress.say(f"damaged artifact, will be rebuilt: {error} (set aside as {aside})")
+            continue
+        _check_artifact(ledger, recipe, digest)
+        whole.add(key)
+    return whole
+
+
+def _check_artifact(ledger: Ledger, recipe: Recipe, digest: str) -> None:
+    recorded = ledger.record_artifact(recipe.key, digest)
+    if recorded != digest:
+        raise ChangedError(
+            f"{recipe.kind} {recipe.key} now has other bytes ({digest[:12]}) than when this run "
+            f"began ({recorded[:12]}): it was rebuilt on another kind of machine. Choose another "
+            "--out to start over with it"
+        )
+
+
+@dataclass
+class Builds:
+    """Makes missing artifacts, each as soon as its inputs are there."""
+
+    plan: Plan
+    store: Store
+    ledger: Ledger
+    executor: Executor
+    progress: Progress
+    _attempts: dict[str, int] = field(default_factory=dict)
+
+    def run(self, present: set[str]) -> float:
+        """Build everything not present; returns the seconds that workers were busy with it.
+
+        Raises BadDataError for data or training that cannot be used, IncompleteError for a build
+        that failed three times.
+        """
+        missing = {key: r for key, r in self.plan.recipes.items() if key not in present}
+        for key in self._inputs_of(missing.values()) & present:
+            self._provide(self.plan.recipes[key])
+        self.progress.phase("training", len(self.plan.recipes), len(present))
+        available, submitted, seconds = set(present), set[str](), 0.0
+        while len(submitted) < len(missing) or self._in_flight(submitted, available):
+            for key, recipe in missing.items():
+                if key not in submitted and set(recipe.inputs.values()) <= available:
+                    self.executor.submit(BuildJob(recipe))
+                    submitted.add(key)
+            report = self.executor.next()
+            assert isinstance(report.job, BuildJob)
+            recipe = report.job.recipe
+            if self._finish(recipe, report):
+                seconds += report.seconds
+                available.add(recipe.key)
+                self.progress.advance()
+            else:
+                submitted.discard(recipe.key)
+        return seconds
+
+    def _in_flight(self, submitted: set[str], available: set[str]) -> bool:
+        return not submitted <= available
+
+    def _inputs_of(self, recipes: Iterable[Recipe]) -> set[str]:
+        return {key for recipe in recipes for key in recipe.inputs.values()}
+
+    def _provide(self, recipe: Recipe) -> None:
+        self.executor.provide(recipe.key, self.store.read(recipe.kind, recipe.key))
+
+    def _finish(self, recipe: Recipe, report: Report) -> bool:
+        """Keep a built artifact; False when the build is to be tried again."""
+        if report.artifact is not None:
+            made = {
+                "kind": recipe.kind,
+                "params": recipe.params,
+                "inputs": recipe.inputs,
+                "seconds": round(report.seconds, 3),
+            }
+            digest = self.store.write(recipe.kind, recipe.key, report.artifact, made)
+            _check_artifact(self.ledger, recipe, digest)
+            self.executor.provide(recipe.key, report.artifact)
+            return True
+        if report.trouble == "bad data":
+            raise BadDataError(f"{recipe.kind} {recipe.key}: {self._located(recipe, report.error)}")
+        attempts = self._attempts[recipe.key] = self._attempts.get(recipe.key, 0) + 1
+        if attempts >= ATTEMPTS:
+            raise IncompleteError(
+                f"building {recipe.kind} {recipe.key} failed {attempts} times, last with:\n"
+                f"{report.error.strip()}"
+            )
+        self.progress.say(f"building {recipe.kind} again: {report.error.strip().splitlines()[-1]}")
+        return False
+
+    def _located(self, recipe: Recipe, error: str) -> str:
+        """Replace the role of a dataset by its place in the store."""
+        for role, key in recipe.inputs.items():
+            if error.startswith(f"{role}/"):
+                kind = self.plan.recipes[key].kind
+                return f"{self.store.path(kind, key)}{error.removeprefix(role)}"
+        return error
+
+
+@dataclass
+class Evaluation:
+    """Walks the rollout tree: a block is played once its parent's survivors are known."""
+
+    plan: Plan
+    store: Store
+    ledger: Ledger
+    shared: Ledger  # every block that any run over this store has finished
+    executor: Executor
+    progress: Progress
+    seconds: float = 0.0  # that workers were busy playing
+    _ready: deque[tuple[Node, int]] = field(default_factory=deque)
+    _in_flight: int = 0
+    _alone: set[str] = field(default_factory=set)  # blocks whose worker died: to be sent singly
+
+    def run(self) -> None:
+        """Play everything that is missing; blocks that fail three times are left out."""
+        self.progress.phase("evaluation", len(self.plan.tasks), 0)
+        self._place = {task.key: place for place, task in self.plan.tasks.items()}
+        self._adopt()
+        provided = False
+        for root in self.plan.roots():
+            for chunk in range(len(self.plan.chunks)):
+                self._expand(root, chunk)
+        while self._ready or self._in_flight:
+            if not provided:
+                self._provide_models()
+                provided = True
+            self._dispatch()
+            self._receive(self.executor.next())
+
+    def _adopt(self) -> None:
+        """Take over blocks that an earlier run over this store has finished."""
+        missing = [key for key in self._place if key not in self.ledger.finished()]
+        self.ledger.record(self.shared.raw(missing))
+        self._finished = self.ledger.finished()
+        self._given_up = {
+            key for key, (attempts, _) in self.ledger.failures().items() if attempts >= ATTEMPTS
+        } - self._finished
+
+    def _provide_models(self) -> None:
+        keys = {key for task in self.plan.tasks.values() for key in task.artifacts.values()}
+        for key in sorted(keys):
+            kind = self.plan.recipes[key].kind
+            self.executor.provide(key, self.store.read(kind, key))
+
+    def _expand(self, node: Node, chunk: int) -> None:
+        """Queue a block, or, where it is finished, what follows from it."""
+        waiting = [node]
+        while waiting:
+            node = waiting.pop()
+            key = self.plan.tasks[node, chunk].key
+            if key in self._finished:
+                self.progress.advance()
+                if self._has_survivors(key):
+                    waiting.extend(self.plan.children.get(node, []))
+                else:
+                    self.progress.advance(self._descendants(node))
+            elif key in self._given_up:
+                self.progress.advance(1 + self._descendants(node))
+            else:
+                self._ready.append((node, chunk))
+
+    def _descendants(self, node: Node) -> int:
+        """Blocks below a node of one chunk: decided without being played."""
+        children = self.plan.children.get(node, [])
+        return sum(1 + self._descendants(child) for child in children)
+
+    def _has_survivors(self, key: str) -> bool:
+        return bool(self._outcome(key).arrays["success"].any())
+
+    def _outcome(self, key: str) -> Outcome:
+        return next(outcome for _, outcome in self.ledger.outcomes([key]))
+
+    def _dispatch(self) -> None:
+        """Keep every worker supplied with about two bundles."""
+        wanted = 2 * self.executor.workers
+        while self._ready and self._in_flight < wanted:
+            size = max(1, min(LARGEST_BUNDLE, len(self._ready) // wanted))
+            bundle = [self._with_parent(*self._ready.popleft())]
+            while (
+                bundle[0][0].key not in self._alone
+                and len(bundle) < size
+                and self._next_key() not in self._alone
+            ):
+                bundle.append(self._with_parent(*self._ready.popleft()))
+            self.executor.submit(PlayJob(tuple(bundle)))
+            self._in_flight += 1
+
+    def _next_key(self) -> str:
+        return self.plan.tasks[self._ready[0]].key
+
+    def _with_parent(self, node: Node, chunk: int) -> tuple[BlockTask, Outcome | None]:
+        task = self.plan.tasks[node, chunk]
+        if node.parent is None:
+            return task, None
+        return task, self._outcome(self.plan.tasks[node.parent, chunk].key)
+
+    def _receive(self, report: Report) -> None:
+        self._in_flight -= 1
+        self.seconds += report.seconds
+        assert isinstance(report.job, PlayJob)
+        if report.trouble is not None:
+            self._alone |= {task.key for task, _ in report.job.tasks}
+            for task, _ in report.job.tasks:
+                self._failed(task.key, report.error, single=len(report.job.tasks) == 1)
+            return
+        done = [(block.key, block.outcome) for block in report.blocks if block.outcome is not None]
+        self.ledger.record(done)
+        self.shared.record(done)
+        self._finished |= {key for key, _ in done}
+        self._remember_costs(report.job, report.blocks)
+        for block in report.blocks:
+            if block.outcome is None:
+                self._failed(block.key, block.error, single=True)
+            else:
+                self._expand(*self._place[block.key])
+
+    def _remember_costs(self, job: PlayJob, reports: Iterable[BlockReport]) -> None:
+        blocks = {report.key: report for report in reports}
+        costs: dict[str, tuple[int, float]] = {}
+        for task, _ in job.tasks:
+            segments, seconds = costs.get(task.cost_name, (0, 0.0))
+            block = blocks[task.key]
+            costs[task.cost_name] = segments + block.segments, seconds + block.seconds
+        for name, (segments, seconds) in costs.items():
+            self.shared.add_cost(name, segments, seconds)
+
+    def _failed(self, key: str, error: str, *, single: bool) -> None:
+        """Count a failure and queue the block again, or give it up after three.
+
+        When a worker dies with several blocks, any of them may be innocent: they are then sent
+        one by one, and only deaths alone count.
+        """
+        node, chunk = self._place[key]
+        if single and self.ledger.record_failure(key, error) >= ATTEMPTS:
+            self._given_up.add(key)
+            name = self.plan.tasks[node, chunk].name
+            self.progress.say(f"given up after {ATTEMPTS} attempts: {name}: {error.strip()}")
+            self.progress.advance(1 + self._descendants(node))
+        else:
+            self._ready.append((node, chunk))
+
+
+class Stopwatch:
+    """Wall-clock seconds by phase."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._last = time.perf_counter()
+
+    def lap(self, phase: str) -> None:
+        """Everything since the last lap belongs to this phase."""
+        now = time.perf_counter()
+        self.seconds[phase] = self.seconds.get(phase, 0.0) + now - self._last
+        self._last = now

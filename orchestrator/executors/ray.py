@@ -1,0 +1,159 @@
+"""Ray: stateless tasks train, one actor a core plays blocks (here or on a cluster)."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Any
+
+from orchestrator.errors import UsageError
+from orchestrator.jobs import BuildJob, Job, PlayJob, Report
+from orchestrator.store import Artifact
+
+# Read by Ray when it is imported and started.
+os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
+
+OBJECT_STORE_BYTES = 512 * 2**20
+JOBS_PER_WORKER = 2  # one running, one waiting, so that no worker idles between jobs
+
+import ray  # noqa: E402
+from ray.exceptions import RayError  # noqa: E402
+
+
+@ray.remote(num_cpus=1, max_retries=0)
+def _build(job: BuildJob, roles: list[str], *artifacts: Artifact) -> Report:
+    from orchestrator.worker import build, use_one_thread
+
+    use_one_thread()
+    return build(job, dict(zip(roles, artifacts, strict=True)))
+
+
+@ray.remote(num_cpus=1, max_restarts=0)
+class _Player:
+    """A block player with the artifacts it has been shown so far."""
+
+    def __init__(self) -> None:
+        from orchestrator.worker import BlockPlayer, use_one_thread
+
+        use_one_thread()
+        self._player = BlockPlayer()
+        self._artifacts: dict[str, Artifact] = {}
+
+    def play(self, job: PlayJob, references: dict[str, Any]) -> Report:
+        for key in {key for task, _ in job.tasks for key in task.artifacts.values()}:
+            if key not in self._artifacts:
+                self._artifacts[key] = ray.get(references[key])
+        return self._player.play(job, self._artifacts)
+
+
+@dataclass
+class _Seat:
+    """One actor and how many jobs it has been given."""
+
+    actor: Any
+    jobs: int = 0
+
+
+@dataclass
+class _Flight:
+    """A job under way; builds have no seat."""
+
+    job: Job
+    seat: _Seat | None = field(default=None)
+
+
+class RayExecutor:
+    """Runs on this machine's cores, or on the cluster at `address`."""
+
+    def __init__(self, workers: int | None = None, address: str | None = None) -> None:
+        self._owned = not ray.is_initialized()
+        if self._owned:
+            _start(workers, address)
+        self.workers = workers or int(ray.cluster_resources().get("CPU", 1))
+        self._references: dict[str, Any] = {}
+        self._seats: list[_Seat] = []
+        self._waiting: deque[PlayJob] = deque()
+        self._flights: dict[Any, _Flight] = {}
+
+    def provide(self, key: str, artifact: Artifact) -> None:
+        self._references[key] = ray.put(artifact)
+
+    def submit(self, job: Job) -> None:
+        if isinstance(job, BuildJob):
+            self._release_seats()
+            roles = list(job.recipe.inputs)
+            inputs = [self._references[key] for key in job.recipe.inputs.values()]
+            self._flights[_build.remote(job, roles, *inputs)] = _Flight(job)
+        else:
+            self._waiting.append(job)
+            self._seat_waiting()
+
+    def next(self) -> Report:
+        (reference, *_), _ = ray.wait(list(self._flights), num_returns=1)
+        flight = self._flights.pop(reference)
+        if flight.seat is not None:
+            flight.seat.jobs -= 1
+        try:
+            report: Report = ray.get(reference)
+        except RayError as error:
+            report = Report(flight.job, trouble="lost", error=_first_line(error))
+            if flight.seat in self._seats:
+                self._seats.remove(flight.seat)
+        self._seat_waiting()
+        return report
+
+    def close(self) -> None:
+        self._release_seats()
+        for reference in self._flights:
+            ray.cancel(reference, force=True)
+        self._flights.clear()
+        if self._owned:
+            ray.shutdown()
+
+    def _seat_waiting(self) -> None:
+        """Hand waiting jobs to the least busy actors, hiring actors up to the number of workers."""
+        while self._waiting:
+            if len(self._seats) < self.workers:
+                self._seats.append(_Seat(_Player.remote()))  # type: ignore[attr-defined]
+            seat = min(self._seats, key=lambda seat: seat.jobs)
+            if seat.jobs >= JOBS_PER_WORKER:
+                return
+            job = self._waiting.popleft()
+            keys = {key for task, _ in job.tasks for key in task.artifacts.values()}
+            references = {key: self._references[key] for key in keys}
+            seat.jobs += 1
+            self._flights[seat.actor.play.remote(job, references)] = _Flight(job, seat)
+
+    def _release_seats(self) -> None:
+        """Actors hold a core each; give them back so that training tasks can use them."""
+        for seat in [seat for seat in self._seats if not seat.jobs]:
+            self._seats.remove(seat)
+            ray.kill(seat.actor)
+
+
+def _start(workers: int | None, address: str | None) -> None:
+    common: dict[str, Any] = {"log_to_driver": False, "logging_level": logging.ERROR}
+    # A worker is one thread; more would change the bytes.
+    environment = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+    if address is not None:
+        try:
+            ray.init(address=address, runtime_env={"env_vars": environment}, **common)
+        except (ConnectionError, ValueError, RuntimeError) as error:
+            raise UsageError(f"no Ray cluster at {address}: {_first_line(error)}") from error
+        return
+    os.environ.update(environment)
+    ray.init(
+        address="local",
+        num_cpus=workers or os.cpu_count(),
+        include_dashboard=False,
+        object_store_memory=OBJECT_STORE_BYTES,
+        **common,
+    )
+
+
+def _first_line(error: Exception) -> str:
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    return f"{type(error).__name__}: {lines[0] if lines else ''}"

@@ -1,0 +1,34 @@
+"""Everything in this process, one job at a time: for tests, debugging and small runs."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from orchestrator.jobs import BuildJob, Job, Report
+from orchestrator.store import Artifact
+from orchestrator.worker import BlockPlayer, build, use_one_thread
+
+
+class SerialExecutor:
+    workers = 1
+
+    def __init__(self) -> None:
+        use_one_thread()
+        self._player = BlockPlayer()
+        self._artifacts: dict[str, Artifact] = {}
+        self._jobs: deque[Job] = deque()
+
+    def provide(self, key: str, artifact: Artifact) -> None:
+        self._artifacts[key] = artifact
+
+    def submit(self, job: Job) -> None:
+        self._jobs.append(job)
+
+    def next(self) -> Report:
+        job = self._jobs.popleft()
+        if isinstance(job, BuildJob):
+            return build(job, {r: self._artifacts[key] for r, key in job.recipe.inputs.items()})
+        return self._player.play(job, self._artifacts)
+
+    def close(self) -> None:
+        self._jobs.clear()

@@ -1,0 +1,102 @@
+"""A run directory's readable files, written from the ledger and the store."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from orchestrator.driver import ATTEMPTS
+from orchestrator.ledger import Ledger
+from orchestrator.plan import Plan
+from orchestrator.rundir import RunDirectory
+from orchestrator.store import Store
+from orchestrator.structure import Plain
+
+EPISODE_COLUMNS = (
+    "episode",
+    "success",
+    "stitch_steps",
+    "steps",
+    "end_step",
+    "value_start",
+    "value_end",
+)
+
+
+def segments_frame(plan: Plan, ledger: Ledger) -> pd.DataFrame:
+    """One row per segment, in the plan's order, whoever played it and when."""
+    places = {task.key: (node, task) for (node, _), task in plan.tasks.items()}
+    frames = []
+    for key, outcome in ledger.outcomes(places):
+        node, _ = places[key]
+        frame = pd.DataFrame({name: outcome.arrays[name] for name in EPISODE_COLUMNS})
+        frame.insert(0, "depth", len(node.prefix))
+        frame.insert(0, "prefix", ">".join(node.prefix))
+        frame.insert(0, "method", node.method)
+        frame.insert(0, "seed", node.seed)
+        if len(node.prefix) == 1:
+            frame[["value_start", "value_end"]] = np.float32(np.nan)
+        frames.append(frame)
+    return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame()
+
+
+def quarantine(plan: Plan, ledger: Ledger) -> list[Plain]:
+    """Blocks that were given up, each with its last error."""
+    finished, failures = ledger.finished(), ledger.failures()
+    return [
+        {
+            "method": node.method,
+            "seed": node.seed,
+            "prefix": ">".join(node.prefix),
+            "episodes": list(range(*task.episodes)),
+            "error": failures[task.key][1],
+        }
+        for (node, _), task in plan.tasks.items()
+        if task.key not in finished and failures.get(task.key, (0, ""))[0] >= ATTEMPTS
+    ]
+
+
+def learning_curves(plan: Plan, store: Store) -> list[Plain]:
+    """Curves of every trained artifact of the plan."""
+    curves = []
+    for key, recipe in plan.recipes.items():
+        info = store.read(recipe.kind, key).info
+        if "curves" in info:
+            curves.append(
+                {
+                    "kind": recipe.kind,
+                    "seed": recipe.params["seed"],
+                    "name": f"{recipe.kind} seed {recipe.params['seed']}",
+                    "key": key,
+                    "curves": info["curves"],
+                }
+            )
+    return curves
+
+
+def datasets(plan: Plan, store: Store) -> list[Plain]:
+    """What was learned from: rows, episodes and content digest of each dataset."""
+    listing = []
+    for name, key in plan.datasets.items():
+        info = store.read(name, key).info
+        digest = store.manifest(name, key)["digest"]
+        listing.append(
+            {"name": name, "key": key, "digest": digest}
+            | {field: info[field] for field in ("rows", "episodes", "successes")}
+        )
+    return listing
+
+
+def write_readable(plan: Plan, store: Store, ledger: Ledger, directory: RunDirectory) -> Plain:
+    """Write every readable file but the report; returns the counts for the provenance."""
+    segments = segments_frame(plan, ledger)
+    segments.to_parquet(directory.path / "segments.parquet", index=False)
+    directory.write_json("quarantine.json", quarantine(plan, ledger))
+    directory.write_json("training.json", learning_curves(plan, store))
+    directory.write_json("datasets.json", datasets(plan, store))
+    if plan.showcase is not None:
+        directory.write_json("showcase.json", store.read("showcase", plan.showcase).info)
+    return {
+        "segments played": len(segments),
+        "environment steps": int(segments["steps"].sum()),
+    }

@@ -1,0 +1,54 @@
+"""Deletes from a store what none of the given run directories needs."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from orchestrator.errors import UsageError
+from orchestrator.ledger import Ledger
+from orchestrator.plan import make_plan
+from orchestrator.rundir import RunDirectory
+from orchestrator.store import Store
+
+
+def collect_garbage(store_root: Path, runs: Sequence[Path], *, delete: bool) -> Iterator[str]:
+    """Say, and with `delete` remove, artifacts and blocks that no plan of `runs` names.
+
+    Raises UsageError for a path that is no run directory: a typing error must not cost artifacts.
+    """
+    if not runs:
+        raise UsageError("name the run directories to keep, for example runs/table1-paper")
+    needed: set[str] = set()
+    for run in runs:
+        plan = make_plan(RunDirectory(run).spec())
+        needed |= set(plan.recipes) | {task.key for task in plan.tasks.values()}
+    store = Store(store_root)
+    verb = "deleted" if delete else "would delete"
+    freed = 0
+    for kind, key in list(store.artifacts()):
+        if key not in needed:
+            folder = store.path(kind, key)
+            freed += _size(folder)
+            if delete:
+                shutil.rmtree(folder)
+            yield f"{verb} {folder}"
+    for leftovers in (store_root / "incoming", store_root / "corrupt"):
+        if leftovers.is_dir() and any(leftovers.iterdir()):
+            freed += _size(leftovers)
+            if delete:
+                shutil.rmtree(leftovers)
+            yield f"{verb} {leftovers}"
+    shared = Ledger(store_root / "blocks.sqlite")
+    stale = shared.finished() - needed
+    if delete:
+        shared.forget(stale)
+    shared.close()
+    yield f"{verb} {len(stale)} blocks; artifacts freed {freed / 1e6:.1f} MB"
+    if not delete:
+        yield "nothing was touched; add --delete to do it"
+
+
+def _size(folder: Path) -> int:
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())

@@ -1,0 +1,178 @@
+"""The append-only record of finished blocks: one SQLite file, one writer, torn-write safe."""
+
+from __future__ import annotations
+
+import hashlib
+import sqlite3
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from safetensors.numpy import load, save
+
+from orchestrator.errors import NondeterminismError, StorageError
+
+SCHEMA = """
+CREATE TABLE IF NOT EXISTS blocks (
+    key TEXT PRIMARY KEY, digest TEXT NOT NULL, outcome BLOB NOT NULL
+) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS artifacts (
+    key TEXT PRIMARY KEY, digest TEXT NOT NULL
+) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS failures (
+    key TEXT NOT NULL, attempt INTEGER NOT NULL, error TEXT NOT NULL, PRIMARY KEY (key, attempt)
+);
+CREATE TABLE IF NOT EXISTS costs (
+    name TEXT PRIMARY KEY, segments INTEGER NOT NULL, seconds REAL NOT NULL
+) WITHOUT ROWID;
+"""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a block's episodes did; arrays by name, one row an episode (see `worker.play`)."""
+
+    arrays: dict[str, np.ndarray]
+
+    def to_bytes(self) -> bytes:
+        """The same arrays give the same bytes."""
+        return save({name: np.ascontiguousarray(array) for name, array in self.arrays.items()})
+
+    @staticmethod
+    def from_bytes(data: bytes) -> Outcome:
+        return Outcome(load(data))
+
+
+class Ledger:
+    """Truth about what was simulated. The driver alone writes.
+
+    A run directory has one; the store keeps another with every block that any run ever finished,
+    so that a run finds what an earlier one has already played.
+    """
+
+    def __init__(self, path: Path, *, read_only: bool = False) -> None:
+        self.path = path
+        with self._storage_errors():
+            if read_only:
+                self._db = sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=30)
+                return
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._db = sqlite3.connect(path, timeout=30, isolation_level=None)
+            self._db.execute("PRAGMA journal_mode=WAL")
+            self._db.execute("PRAGMA synchronous=FULL")
+            self._db.executescript(SCHEMA)
+
+    def close(self) -> None:
+        self._db.close()
+
+    def record(self, outcomes: Iterable[tuple[str, bytes]]) -> None:
+        """Append finished blocks in one transaction.
+
+        Raises NondeterminismError if a block is already recorded with other bytes.
+        """
+        rows = [(key, hashlib.sha256(data).hexdigest(), data) for key, data in outcomes]
+        with self._transaction():
+            for key, digest, data in rows:
+                self._db.execute(
+                    "INSERT OR IGNORE INTO blocks VALUES (?, ?, ?)", (key, digest, data)
+                )
+                (known,) = self._db.execute(
+                    "SELECT digest FROM blocks WHERE key = ?", (key,)
+                ).fetchone()
+                if known != digest:
+                    raise NondeterminismError(
+                        f"{self.path}: block {key} was played before with other bytes "
+                        f"({known[:12]} then, {digest[:12]} now): the same work gave different "
+                        "results, so the code or the machine is not deterministic"
+                    )
+
+    def finished(self) -> set[str]:
+        return {key for (key,) in self._db.execute("SELECT key FROM blocks")}
+
+    def outcomes(self, keys: Iterable[str]) -> Iterator[tuple[str, Outcome]]:
+        """Recorded outcomes in the order asked for; keys not recorded are skipped.
+
+        Raises NondeterminismError when stored bytes no longer match their digest.
+        """
+        for key in keys:
+            row = self._db.execute(
+                "SELECT digest, outcome FROM blocks WHERE key = ?", (key,)
+            ).fetchone()
+            if row is None:
+                continue
+            digest, data = row
+            if hashlib.sha256(data).hexdigest() != digest:
+                raise NondeterminismError(f"{self.path}: block {key} is damaged on disk")
+            yield key, Outcome.from_bytes(data)
+
+    def raw(self, keys: Iterable[str]) -> Iterator[tuple[str, bytes]]:
+        for key in keys:
+            row = self._db.execute("SELECT outcome FROM blocks WHERE key = ?", (key,)).fetchone()
+            if row is not None:
+                yield key, row[0]
+
+    def record_artifact(self, key: str, digest: str) -> str:
+        """Remember which bytes an artifact had when blocks were played; returns those on record."""
+        with self._transaction():
+            self._db.execute("INSERT OR IGNORE INTO artifacts VALUES (?, ?)", (key, digest))
+        (known,) = self._db.execute("SELECT digest FROM artifacts WHERE key = ?", (key,)).fetchone()
+        return str(known)
+
+    def record_failure(self, key: str, error: str) -> int:
+        """Count a failed attempt at a block; returns how many there have been."""
+        with self._transaction():
+            (count,) = self._db.execute(
+                "SELECT COUNT(*) FROM failures WHERE key = ?", (key,)
+            ).fetchone()
+            self._db.execute("INSERT INTO failures VALUES (?, ?, ?)", (key, count + 1, error))
+        return int(count) + 1
+
+    def failures(self) -> dict[str, tuple[int, str]]:
+        """Attempts and last error of every block that ever failed."""
+        rows = self._db.execute("SELECT key, attempt, error FROM failures ORDER BY key, attempt")
+        return {key: (attempt, error) for key, attempt, error in rows}
+
+    def forget(self, keys: Iterable[str]) -> None:
+        """Remove blocks that nobody needs and give their space back to the disk."""
+        with self._transaction():
+            self._db.executemany("DELETE FROM blocks WHERE key = ?", [(key,) for key in keys])
+        with self._storage_errors():
+            self._db.execute("VACUUM")
+
+    def add_cost(self, name: str, segments: int, seconds: float) -> None:
+        """Remember what playing segments of a kind took, for later estimates."""
+        with self._transaction():
+            self._db.execute(
+                "INSERT INTO costs VALUES (?, ?, ?) ON CONFLICT (name) DO UPDATE SET "
+                "segments = segments + excluded.segments, seconds = seconds + excluded.seconds",
+                (name, segments, seconds),
+            )
+
+    def seconds_per_segment(self) -> dict[str, float]:
+        rows = self._db.execute("SELECT name, seconds / segments FROM costs WHERE segments > 0")
+        return dict(rows)
+
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
+        with self._storage_errors():
+            self._db.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+            except BaseException:
+                if self._db.in_transaction:
+                    self._db.execute("ROLLBACK")
+                raise
+            self._db.execute("COMMIT")
+
+    @contextmanager
+    def _storage_errors(self) -> Iterator[None]:
+        try:
+            yield
+        except sqlite3.OperationalError as error:
+            if getattr(self, "_db", None) is not None and self._db.in_transaction:
+                self._db.execute("ROLLBACK")
+            raise StorageError(
+                f"cannot write {self.path}: {error}; make room and run the same command again"
+            ) from error

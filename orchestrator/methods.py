@@ -1,0 +1,136 @@
+"""The methods of the tables: their settings, what each must have trained, and their labels."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from orchestrator.errors import UsageError
+from orchestrator.structure import structure
+from stitching.data.experience import skill_pairs
+from stitching.envs.protocol import Benchmark
+from stitching.models.agent import Agent
+from stitching.models.dynamics import Dynamics
+from stitching.models.iql import IQLConfig
+from stitching.planning.cem import CEM
+from stitching.planning.objective import Norm
+from stitching.planning.random_shooting import RandomShooting
+from stitching.stitchers import MBStitch, MFStitch, NoStitch, RandomStitch, Stitcher
+
+
+@dataclass(frozen=True)
+class NoStitchConfig:
+    """Direct chaining has nothing to set."""
+
+
+@dataclass(frozen=True)
+class RandomStitchConfig:
+    limit: int = 5  # most stitching steps between two skills
+
+
+@dataclass(frozen=True)
+class MFStitchConfig:
+    limit: int = 5
+    training: IQLConfig = IQLConfig()  # the extra policy, learned from the mixed data
+
+
+@dataclass(frozen=True)
+class MBStitchConfig:
+    limit: int = 5
+    execute: int = 1  # actions of each plan carried out before planning again
+    alpha: float = 1.0  # α of Eq. 2, price of the value ensemble's disagreement
+    beta: float = 1.0  # β of Eq. 2, price of the dynamics ensemble's disagreement
+    norm: Norm = "mean"  # how Eq. 2's second variance becomes a number
+    planner: Literal["random-shooting", "cem"] = "cem"
+    random_shooting: RandomShooting = RandomShooting()
+    cem: CEM = CEM()
+
+
+MethodConfig = NoStitchConfig | RandomStitchConfig | MFStitchConfig | MBStitchConfig
+
+
+@dataclass(frozen=True)
+class Method:
+    label: str
+    config: type[MethodConfig]
+    needs: tuple[str, ...] = ()  # kinds of artifacts beside the agent
+
+
+METHODS: dict[str, Method] = {
+    "no-stitch": Method("No-Stitch", NoStitchConfig),
+    "random-stitch": Method("Random-Stitch", RandomStitchConfig),
+    "mf-stitch": Method("MF-Stitch", MFStitchConfig, needs=("mf-policy",)),
+    "mb-stitch": Method("MB-Stitch", MBStitchConfig, needs=("dynamics",)),
+}
+
+
+def parse_method(method: str) -> tuple[str, dict[str, Any]]:
+    """ "mb-stitch[alpha=1,beta=10]" → ("mb-stitch", {"alpha": 1, "beta": 10}).
+
+    Raises UsageError, listing the methods there are.
+    """
+    match = re.fullmatch(r"([\w-]+)(?:\[(.*)\])?", method)
+    if match is None:
+        raise UsageError(f"method {method!r}: write name or name[field=value,field=value]")
+    name, inner = match.groups()
+    if name not in METHODS:
+        raise UsageError(f"unknown method {name!r}; there are {', '.join(METHODS)}")
+    settings = [item.partition("=") for item in (inner or "").split(",") if item]
+    return name, {key.strip(): _scalar(text.strip()) for key, _, text in settings}
+
+
+def method_name(method: str) -> str:
+    """The method without its settings."""
+    return parse_method(method)[0]
+
+
+def _scalar(text: str) -> Any:
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def method_label(method: str) -> str:
+    """How tables print a method: "MB-Stitch [alpha=1,beta=10]"."""
+    name, _ = parse_method(method)
+    return method.replace(name, METHODS[name].label, 1).replace("[", " [", 1)
+
+
+def make_stitcher(
+    method: str,
+    settings: dict[str, Any],
+    benchmark: Benchmark,
+    agent: Agent,
+    models: Mapping[str, Any],
+) -> Stitcher:
+    """The stitcher of a method, from its plain settings and the models it needs, by kind.
+
+    First skills come before any stitching and have method "": the same for every method.
+    """
+    if not method:
+        return NoStitch()
+    config = structure(METHODS[method_name(method)].config, settings, f"method {method}")
+    if isinstance(config, RandomStitchConfig):
+        return RandomStitch(benchmark.actions, config.limit)
+    if isinstance(config, MFStitchConfig):
+        pairs = {pair: row for row, pair in enumerate(skill_pairs(len(benchmark.skills)))}
+        return MFStitch(models["mf-policy"], pairs, benchmark.actions, config.limit)
+    if isinstance(config, MBStitchConfig):
+        dynamics: Dynamics = models["dynamics"]
+        planner = config.cem if config.planner == "cem" else config.random_shooting
+        return MBStitch(
+            agent,
+            dynamics,
+            planner,
+            benchmark.actions,
+            config.alpha,
+            config.beta,
+            config.norm,
+            config.execute,
+            config.limit,
+        )
+    return NoStitch()

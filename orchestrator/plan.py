@@ -1,0 +1,171 @@
+"""A spec expanded: the artifacts it takes, the rollout tree, and every block's name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+from orchestrator.builders import BLOCK_CODE
+from orchestrator.jobs import BlockTask
+from orchestrator.methods import METHODS, MFStitchConfig, method_name
+from orchestrator.recipes import Recipe, code_fingerprint, digest
+from orchestrator.spec import Spec
+from orchestrator.structure import Plain, to_plain
+from stitching.envs.registry import DATASETS
+
+Prefix = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Node:
+    """One more skill for the episodes that survived a prefix. First skills have no method."""
+
+    seed: int
+    method: str
+    prefix: Prefix
+
+    @property
+    def parent(self) -> Node | None:
+        if len(self.prefix) == 1:
+            return None
+        method = self.method if len(self.prefix) > 2 else ""
+        return Node(self.seed, method, self.prefix[:-1])
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Artifacts in an order in which they can be made, and the tree of nodes, parents first."""
+
+    spec: Spec
+    recipes: dict[str, Recipe]  # by key
+    agents: dict[int, str]  # seed → key
+    dynamics: dict[int, str]
+    mf_policies: dict[tuple[int, str], str]  # (seed, method) → key
+    datasets: dict[str, str]  # name → key
+    showcase: str | None
+    nodes: tuple[Node, ...]
+
+    @cached_property
+    def chunks(self) -> list[tuple[int, int]]:
+        """Episode ranges of a node's blocks."""
+        size, total = self.spec.block_episodes, self.spec.episodes
+        return [(first, min(first + size, total)) for first in range(0, total, size)]
+
+    @cached_property
+    def tasks(self) -> dict[tuple[Node, int], BlockTask]:
+        """Every block by node and chunk, parents first."""
+        return {
+            (node, chunk): self._task(node, episodes)
+            for node in self.nodes
+            for chunk, episodes in enumerate(self.chunks)
+        }
+
+    @cached_property
+    def children(self) -> dict[Node, list[Node]]:
+        following: dict[Node, list[Node]] = {}
+        for node in self.nodes:
+            if node.parent is not None:
+                following.setdefault(node.parent, []).append(node)
+        return following
+
+    def roots(self) -> Iterator[Node]:
+        return (node for node in self.nodes if node.parent is None)
+
+    def _task(self, node: Node, episodes: tuple[int, int]) -> BlockTask:
+        spec = self.spec
+        artifacts = {"agent": self.agents[node.seed]}
+        stitcher: Plain = {}
+        if node.method:
+            stitcher = to_plain(spec.method_config(node.method))
+            for kind in METHODS[method_name(node.method)].needs:
+                artifacts[kind] = (
+                    self.dynamics[node.seed]
+                    if kind == "dynamics"
+                    else self.mf_policies[node.seed, node.method]
+                )
+        content = {
+            "benchmark": spec.benchmark,
+            "root_seed": spec.root_seed,
+            "seed": node.seed,
+            # Planner streams are named by the kind of method, so that settings of one method are
+            # compared under common random numbers.
+            "method": method_name(node.method) if node.method else "",
+            "stitcher": stitcher,
+            "prefix": node.prefix,
+            "episodes": episodes,
+            "step_limit": spec.step_limit,
+            "rollout": to_plain(spec.rollout),
+            "artifacts": artifacts,
+            "configs": {"dynamics": to_plain(spec.dynamics)},
+        }
+        key = digest(content | {"code": code_fingerprint(BLOCK_CODE)})
+        return BlockTask(key=key, **content)
+
+
+def make_plan(spec: Spec) -> Plan:
+    """Expand a spec. Pure: looks at neither store nor ledger."""
+    recipes: dict[str, Recipe] = {}
+
+    def add(kind: str, params: Plain, inputs: dict[str, str] | None = None) -> str:
+        recipe = Recipe(kind, {"benchmark": spec.benchmark, **params}, inputs or {})
+        recipes[recipe.key] = recipe
+        return recipe.key
+
+    root = {"root_seed": spec.root_seed}
+    data = {"config": to_plain(spec.data), **root}
+    datasets = {name: add(name, data) for name in DATASETS[spec.benchmark]}
+    demonstrations = {"demonstrations": datasets["demonstrations"]}
+    seeds = range(spec.seeds)
+    agents = {
+        seed: add("agent", {"config": to_plain(spec.agent), "seed": seed, **root}, demonstrations)
+        for seed in seeds
+    }
+    needed = {kind for method in spec.methods for kind in METHODS[method_name(method)].needs}
+    dynamics, mf_policies = {}, {}
+    for seed in seeds:
+        if "dynamics" in needed:
+            params = {"config": to_plain(spec.dynamics), "seed": seed, **root}
+            dynamics[seed] = add("dynamics", params, datasets)
+        for method in spec.methods:
+            config = spec.method_config(method)
+            if isinstance(config, MFStitchConfig):
+                params = {"config": to_plain(config.training), "seed": seed, **root}
+                mf_policies[seed, method] = add("mf-policy", params, demonstrations)
+    showcase = None
+    if spec.benchmark == "maze" and "dynamics" in needed:
+        showcase = add(*_showcase(spec, agents[0], dynamics[0], demonstrations))
+    return Plan(
+        spec, recipes, agents, dynamics, mf_policies, datasets, showcase, tuple(_nodes(spec))
+    )
+
+
+def _showcase(
+    spec: Spec, agent: str, dynamics: str, demonstrations: dict[str, str]
+) -> tuple[str, Plain, dict[str, str]]:
+    """Figure 1's task, by direct chaining and by MB-Stitch."""
+    shown = [m for m in spec.methods if method_name(m) in ("no-stitch", "mb-stitch")]
+    longest = max(spec.all_tasks, key=len)
+    figure1 = ("g0", "g1", "g3", "g2")
+    params = {
+        "methods": {method: to_plain(spec.method_config(method)) for method in shown},
+        "configs": {"dynamics": to_plain(spec.dynamics)},
+        "rollout": to_plain(spec.rollout),
+        "task": figure1 if figure1 in spec.all_tasks else longest,
+        "step_limit": spec.step_limit,
+        "root_seed": spec.root_seed,
+        "seed": 0,
+    }
+    return "showcase", params, {"agent": agent, "dynamics": dynamics, **demonstrations}
+
+
+def _nodes(spec: Spec) -> list[Node]:
+    """Every prefix of every task, parents first, each once."""
+    nodes: dict[Node, None] = {}
+    for seed in range(spec.seeds):
+        for depth in range(1, max(map(len, spec.all_tasks)) + 1):
+            for method in spec.methods if depth > 1 else ("",):
+                for task in spec.all_tasks:
+                    if len(task) >= depth:
+                        nodes[Node(seed, method, task[:depth])] = None
+    return list(nodes)

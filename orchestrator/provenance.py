@@ -1,0 +1,81 @@
+"""Where a result comes from: versions, revision, machine, times."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import platform
+import subprocess
+from datetime import UTC, datetime
+from pathlib import Path
+
+from orchestrator.builders import BLOCK_CODE, BUILDERS
+from orchestrator.recipes import NUMERIC_PACKAGES, code_fingerprint
+from orchestrator.structure import Plain
+
+REPORTED_PACKAGES = (
+    "skillstitch",
+    "torch",
+    "numpy",
+    "mujoco",
+    "gymnasium-robotics",
+    "robosuite",
+    "ray",
+    "optuna",
+    "mlflow",
+    "pandas",
+)
+
+
+def matters() -> Plain:
+    """What must not change under a run: a change may change its numbers."""
+    modules = sorted({builder.code for builder in BUILDERS.values()} | {BLOCK_CODE})
+    code = {f"code of {module}": code_fingerprint(module)[:12] for module in modules}
+    packages = {name: importlib.metadata.version(name) for name in NUMERIC_PACKAGES}
+    return code | packages
+
+
+def provenance() -> Plain:
+    """Versions, source revision and machine, as a report prints them."""
+    return {
+        "written": datetime.now(UTC).isoformat(timespec="seconds"),
+        "versions": {"python": platform.python_version()}
+        | {name: _version(name) for name in REPORTED_PACKAGES},
+        "git_revision": git_revision(),
+        "cpu": _cpu(),
+        "cores": os.cpu_count(),
+        "system": f"{platform.system()} {platform.machine()}",
+    }
+
+
+def _version(package: str) -> str:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return "not installed"
+
+
+def git_revision() -> str:
+    """Commit of the source tree, marked when it has uncommitted changes."""
+    source = Path(__file__).parent
+    try:
+        answer = subprocess.run(
+            ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"],
+            cwd=source,
+            capture_output=True,
+            text=True,
+            timeout=10,
+            check=True,
+        )
+    except (OSError, subprocess.SubprocessError):
+        return "unknown"
+    return answer.stdout.strip()
+
+
+def _cpu() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        return platform.processor()
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor()

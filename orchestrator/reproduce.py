@@ -1,0 +1,184 @@
+"""One reproduction from beginning to end: plan, build, play, write, report, track."""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from analysis.episodes import write_episodes
+from analysis.report import build_report
+from orchestrator import tracking
+from orchestrator.driver import Builds, Evaluation, Progress, Stopwatch, verified_artifacts
+from orchestrator.errors import IncompleteError
+from orchestrator.executors import ExecutorKind, open_executor
+from orchestrator.executors.protocol import Executor
+from orchestrator.exports import write_readable
+from orchestrator.jobs import Job, Report
+from orchestrator.ledger import Ledger
+from orchestrator.plan import make_plan
+from orchestrator.provenance import provenance
+from orchestrator.rundir import RunDirectory
+from orchestrator.spec import Spec
+from orchestrator.store import Artifact, Store, storage_errors
+from orchestrator.structure import Plain
+
+NO_TRACKING = "none"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Where and how a run is carried out; nothing here may change its results."""
+
+    out: Path
+    store: Path = Path("runs/store")
+    executor: ExecutorKind = "ray"
+    workers: int | None = None  # all cores, or all of the cluster's
+    address: str | None = None  # of a Ray cluster
+    tracking_uri: str | None = None  # SQLite beside the store; "none" turns tracking off
+
+    def resolved_tracking_uri(self) -> str:
+        return self.tracking_uri or tracking.default_uri(self.store.parent)
+
+
+@dataclass
+class LazyExecutor:
+    """Opens the real executor at the first job: a run that finds everything never starts Ray."""
+
+    settings: Settings
+    seconds_to_open: float = 0.0
+    opened: Executor | None = field(default=None)
+
+    def _open(self) -> Executor:
+        if self.opened is None:
+            started = time.perf_counter()
+            settings = self.settings
+            self.opened = open_executor(settings.executor, settings.workers, settings.address)
+            self.seconds_to_open = time.perf_counter() - started
+        return self.opened
+
+    @property
+    def workers(self) -> int:
+        return self._open().workers
+
+    def provide(self, key: str, artifact: Artifact) -> None:
+        self._open().provide(key, artifact)
+
+    def submit(self, job: Job) -> None:
+        self._open().submit(job)
+
+    def next(self) -> Report:
+        return self._open().next()
+
+    def close(self) -> None:
+        if self.opened is not None:
+            self.opened.close()
+
+
+def reproduce(spec: Spec, settings: Settings, progress: Progress) -> RunDirectory:
+    """Carry a spec out, or go on where an earlier run of it ended; returns its directory.
+
+    Raises LockedError, ChangedError, BadDataError, StorageError; IncompleteError when blocks had
+    to be given up (everything else is then finished and reported as partial).
+    """
+    directory = RunDirectory(settings.out)
+    with directory.locked():
+        run_id = directory.settle(spec)
+        uri = settings.resolved_tracking_uri()
+        if _work(spec, settings, directory, run_id, progress):
+            _write_report(directory, progress)
+        if trouble := publish(directory, uri, finished=True):
+            progress.say(f"tracking: {trouble}")
+        if given_up := directory.read_json("quarantine.json"):
+            raise IncompleteError(
+                f"{len(given_up)} blocks were given up after repeated failures (see "
+                f"{directory.path / 'quarantine.json'}); the tables are marked as partial"
+            )
+    return directory
+
+
+def _work(
+    spec: Spec, settings: Settings, directory: RunDirectory, run_id: str, progress: Progress
+) -> bool:
+    """Build and play whatever is missing; False when the run was complete before."""
+    watch = Stopwatch()
+    plan = make_plan(spec)
+    store, ledger = Store(settings.store), directory.ledger()
+    shared = Ledger(settings.store / "blocks.sqlite")
+    present = verified_artifacts(plan, store, ledger, progress)
+    evaluation_done = (directory.path / "report" / "index.html").is_file()
+    if evaluation_done and present == set(plan.recipes):
+        return False
+    directory.write_json("provenance.json", provenance() | {"run_id": run_id})
+    announcement = _announce(directory, settings.resolved_tracking_uri())
+    executor = LazyExecutor(settings)
+    try:
+        watch.lap("preparing")
+        builds = Builds(plan, store, ledger, executor, progress)
+        busy_training = builds.run(present)
+        watch.lap("training")
+        evaluation = Evaluation(plan, store, ledger, shared, executor, progress)
+        evaluation.run()
+        watch.lap("evaluation")
+    finally:
+        executor.close()
+        announcement.join()
+    with storage_errors(directory.path):
+        counts = write_readable(plan, store, ledger, directory)
+        episodes = write_episodes(directory.path)
+    counts["episodes"] = len(episodes)
+    counts["environment steps without the tree"] = int(episodes["steps"].sum())
+    watch.lap("writing")
+    watch.seconds["training"] -= executor.seconds_to_open
+    timings: Plain = {"starting workers": executor.seconds_to_open} | watch.seconds
+    directory.write_json(
+        "provenance.json",
+        provenance()
+        | {
+            "run_id": run_id,
+            "executor": settings.executor,
+            "workers": executor.opened.workers if executor.opened else 0,
+            "timings": {phase: round(seconds, 1) for phase, seconds in timings.items()},
+            "busy worker seconds": {
+                "training": round(busy_training, 1),
+                "evaluation": round(evaluation.seconds, 1),
+            },
+            "counts": counts,
+        },
+    )
+    return True
+
+
+def _write_report(directory: RunDirectory, progress: Progress) -> None:
+    started = time.perf_counter()
+    with storage_errors(directory.path):
+        build_report(directory.path)
+    progress.say(f"report written in {time.perf_counter() - started:.1f} s")
+
+
+def _announce(directory: RunDirectory, uri: str) -> threading.Thread:
+    """Show the run in MLflow as running, beside the work: importing MLflow alone takes seconds.
+
+    Its outcome does not matter: whatever is missed now, the last publication brings.
+    """
+    thread = threading.Thread(target=publish, args=(directory, uri), kwargs={"finished": False})
+    thread.start()
+    return thread
+
+
+def publish(directory: RunDirectory, uri: str, *, finished: bool) -> str:
+    """Bring MLflow's view of a run up to date; returns what went wrong, "" if nothing did."""
+    if uri == NO_TRACKING:
+        return ""
+    outcome = tracking.publish(directory.path, uri, finished=finished)
+    return "" if outcome.ok else f"{outcome.error}; the next command publishes what was missed"
+
+
+def catch_up(directory: RunDirectory) -> str:
+    """Publish what an earlier command could not; cheap where nothing was missed."""
+    if not (directory.path / "tracking.json").is_file():
+        return ""
+    uri = directory.read_json("tracking.json")["uri"]
+    finished = (directory.path / "report" / "index.html").is_file()
+    return publish(directory, uri, finished=finished)

@@ -1,0 +1,130 @@
+"""A run directory: self-contained, held by one process at a time, and true to one spec."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import socket
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from orchestrator.errors import ChangedError, LockedError, UsageError
+from orchestrator.ledger import Ledger
+from orchestrator.methods import method_label
+from orchestrator.provenance import matters
+from orchestrator.spec import Spec, differences, spec_from_plain
+from orchestrator.store import storage_errors, write_atomically
+from orchestrator.structure import Plain, to_plain
+
+
+class RunDirectory:
+    """Paths and small files of one run.
+
+    spec.json         what was asked, resolved
+    identity.json     id of this run, and the versions that must not change under it
+    ledger.sqlite     every finished block
+    provenance.json   where, when and with what it was made
+    segments.parquet, episodes.parquet, training.json, datasets.json, showcase.json, report/
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    @property
+    def ledger_path(self) -> Path:
+        return self.path / "ledger.sqlite"
+
+    def ledger(self, *, read_only: bool = False) -> Ledger:
+        return Ledger(self.ledger_path, read_only=read_only)
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Hold the directory; LockedError at once, naming the holder, if somebody else does.
+
+        The kernel drops the lock with its process, however that ends.
+        """
+        with storage_errors(self.path):
+            self.path.mkdir(parents=True, exist_ok=True)
+            descriptor = os.open(self.path / "lock", os.O_RDWR | os.O_CREAT, 0o644)
+        try:
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                holder = os.read(descriptor, 200).decode(errors="replace").strip()
+                raise LockedError(
+                    f"{self.path} is in use by {holder or 'another process'}; "
+                    "wait for it, or choose another --out"
+                ) from None
+            os.ftruncate(descriptor, 0)
+            os.pwrite(descriptor, f"process {os.getpid()} on {socket.gethostname()}".encode(), 0)
+            yield
+        finally:
+            os.close(descriptor)
+
+    def settle(self, spec: Spec) -> str:
+        """Claim the directory for a spec, or check that it is the same one; returns the run's id.
+
+        Raises ChangedError naming what differs: a field, a package version, the code.
+        """
+        identity_path = self.path / "identity.json"
+        if not identity_path.exists():
+            identity = {"run_id": uuid.uuid4().hex, "matters": matters()}
+            self.write_json("spec.json", describe(spec))
+            self.write_json("identity.json", identity)
+            return str(identity["run_id"])
+        identity = json.loads(identity_path.read_text())
+        changed = differences(self.spec(), spec)
+        before, now = identity["matters"], matters()
+        changed += [
+            f"{name}: {before.get(name)} → {now.get(name)}"
+            for name in sorted(before.keys() | now.keys())
+            if before.get(name) != now.get(name)
+        ]
+        if changed:
+            raise ChangedError(
+                f"{self.path} was made under something else; choose another --out (finished "
+                "artifacts and blocks are shared), or go back to:\n  " + "\n  ".join(changed)
+            )
+        return str(identity["run_id"])
+
+    def spec(self) -> Spec:
+        """The spec this directory was made for. UsageError where there is no run."""
+        path = self.path / "spec.json"
+        if not path.is_file():
+            raise UsageError(f"{self.path} is no run directory: it has no spec.json")
+        plain = json.loads(path.read_text())
+        return spec_from_plain(plain["spec"], str(path))
+
+    def write_json(self, name: str, content: Any) -> None:
+        text = json.dumps(content, sort_keys=True, indent=1, ensure_ascii=False)
+        write_atomically(self.path / name, (text + "\n").encode())
+
+    def read_json(self, name: str) -> Any:
+        path = self.path / name
+        return json.loads(path.read_text()) if path.is_file() else None
+
+
+def describe(spec: Spec) -> Plain:
+    """The spec for readers of a run directory: resolved lists, and the spec itself."""
+    return {
+        "name": spec.name,
+        "title": spec.title,
+        "benchmark": spec.benchmark,
+        "scale": spec.scale,
+        "skills": spec.skill_names,
+        "methods": [{"name": method, "label": method_label(method)} for method in spec.methods],
+        "seeds": list(range(spec.seeds)),
+        "episodes": spec.episodes,
+        "tasks": [">".join(task) for task in spec.all_tasks],
+        "step_limits": {str(length): limit for length, limit in spec.step_limits.items()},
+        "tables": [to_plain(table) for table in spec.tables],
+        "spec": to_plain(spec),
+    }
+
+
+def default_out(spec: Spec) -> Path:
+    return Path("runs") / f"{spec.name}-{spec.scale}"

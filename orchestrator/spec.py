@@ -1,0 +1,183 @@
+"""What is to be reproduced, as a frozen dataclass read from a TOML file and open to overrides."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass, field
+from importlib import resources
+from itertools import permutations
+from pathlib import Path
+from typing import Any, Literal
+
+import tyro
+
+from orchestrator.errors import UsageError
+from orchestrator.methods import (
+    METHODS,
+    MBStitchConfig,
+    MethodConfig,
+    MFStitchConfig,
+    RandomStitchConfig,
+    parse_method,
+)
+from orchestrator.structure import Plain, structure, to_plain
+from stitching.data.maze import MazeDataConfig
+from stitching.envs.registry import BENCHMARKS
+from stitching.models.dynamics import DynamicsConfig
+from stitching.models.iql import IQLConfig
+from stitching.rollout import RolloutConfig
+
+Scale = Literal["smoke", "quick", "paper"]
+DataConfig = MazeDataConfig
+
+
+@dataclass(frozen=True)
+class TableSpec:
+    """One table to write from the ledger."""
+
+    id: str
+    paper: str  # the number of the paper's table it stands beside
+    rows: str = "length"  # how tasks are grouped into rows: length, last_skill, task
+    title: str = ""
+    noun: str = "skills"  # what a row label counts
+
+
+@dataclass(frozen=True)
+class Spec:
+    """A reproduction: tasks × methods × seeds × episodes of one benchmark, and its tables."""
+
+    name: str
+    title: str
+    benchmark: str
+    data: tyro.conf.AvoidSubcommands[DataConfig]
+    scale: Scale = "paper"
+    lengths: tuple[int, ...] = ()  # all permutations of these many skills
+    tasks: tuple[str, ...] = ()  # and these tasks, as "a>b>c"
+    step_limits: dict[int, int] = field(default_factory=dict)  # whole task, by its length
+    methods: tuple[str, ...] = ("no-stitch", "mb-stitch")  # e.g. mb-stitch[alpha=1,beta=10]
+    seeds: int = 3  # a seed retrains everything
+    episodes: int = 100  # a task, a method and a seed
+    root_seed: int = 0
+    block_episodes: int = 100  # episodes that step together; part of what makes the bytes
+    rollout: RolloutConfig = RolloutConfig()
+    agent: IQLConfig = IQLConfig()
+    dynamics: DynamicsConfig = DynamicsConfig()
+    random_stitch: RandomStitchConfig = RandomStitchConfig()
+    mf_stitch: MFStitchConfig = MFStitchConfig()
+    mb_stitch: MBStitchConfig = MBStitchConfig()
+    tables: tuple[TableSpec, ...] = ()
+
+    def __post_init__(self) -> None:
+        names = self.skill_names
+        for task in self.all_tasks:
+            if unknown := [skill for skill in task if skill not in names]:
+                raise UsageError(
+                    f"spec {self.name}, tasks: {self.benchmark} has no skill {unknown[0]!r}; "
+                    f"it has {', '.join(names)}"
+                )
+            if len(task) not in self.step_limits:
+                raise UsageError(
+                    f"spec {self.name}, step_limits: none for tasks of {len(task)} skills; "
+                    f"add step_limits.{len(task)}"
+                )
+        if not self.all_tasks:
+            raise UsageError(f"spec {self.name}: no tasks; set lengths or tasks")
+        for count in ("seeds", "episodes", "block_episodes"):
+            if getattr(self, count) < 1:
+                raise UsageError(f"spec {self.name}, {count}: must be at least 1")
+        for method in self.methods:
+            self.method_config(method)
+
+    @property
+    def skill_names(self) -> list[str]:
+        return [skill.name for skill in BENCHMARKS[self.benchmark].skills]
+
+    @property
+    def all_tasks(self) -> list[tuple[str, ...]]:
+        """Every task, in a fixed order and once."""
+        drawn = [task for n in self.lengths for task in permutations(self.skill_names, n)]
+        named = [tuple(task.split(">")) for task in self.tasks]
+        return list(dict.fromkeys(drawn + named))
+
+    @property
+    def step_limit(self) -> int:
+        """Episodes are played to the longest limit of their benchmark and cut afterwards."""
+        return max(self.step_limits.values())
+
+    def method_config(self, method: str) -> MethodConfig:
+        """The configuration of `name` or `name[field=value,…]`; UsageError lists what is valid."""
+        name, overrides = parse_method(method)
+        settings: dict[str, Plain] = {
+            "no-stitch": {},
+            "random-stitch": to_plain(self.random_stitch),
+            "mf-stitch": to_plain(self.mf_stitch),
+            "mb-stitch": to_plain(self.mb_stitch),
+        }
+        return structure(METHODS[name].config, settings[name] | overrides, f"method {method}")
+
+
+def packaged_specs() -> list[str]:
+    return sorted(
+        entry.name.removesuffix(".toml")
+        for entry in resources.files("orchestrator.specs").iterdir()
+        if entry.name.endswith(".toml")
+    )
+
+
+def load_spec(name_or_file: str, scale: Scale = "paper") -> Spec:
+    """A packaged spec by name, or any TOML file, at one of its scales.
+
+    TOML holds values only, so a spec cannot execute anything. Raises UsageError for an unknown
+    name, field, scale or value, listing what is valid.
+    """
+    if name_or_file in packaged_specs():
+        text = resources.files("orchestrator.specs").joinpath(f"{name_or_file}.toml").read_text()
+        where = f"packaged spec {name_or_file}"
+    elif Path(name_or_file).is_file():
+        text, where = Path(name_or_file).read_text(), name_or_file
+    else:
+        raise UsageError(
+            f"no spec {name_or_file!r}: neither a file nor one of {', '.join(packaged_specs())}"
+        )
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise UsageError(f"{where}: not valid TOML: {error}") from error
+    scales = content.pop("scales", {"paper": {}})
+    if scale not in scales:
+        raise UsageError(f"{where}: no scale {scale!r}; it has {', '.join(scales)}")
+    return spec_from_plain(_merged(content, scales[scale]) | {"scale": scale}, where)
+
+
+def spec_from_plain(content: Plain, where: str) -> Spec:
+    """A spec from parsed TOML or from a run directory's spec.json."""
+    benchmark = content.get("benchmark")
+    if benchmark not in BENCHMARKS:
+        raise UsageError(
+            f"{where}: unknown benchmark {benchmark!r}; there are {', '.join(BENCHMARKS)}"
+        )
+    return structure(Spec, {"data": {}} | content, where)
+
+
+def differences(old: Spec, new: Spec) -> list[str]:
+    """Human-readable list of the fields in which two specs differ."""
+    return _differences(to_plain(old), to_plain(new), "")
+
+
+def _differences(old: Any, new: Any, path: str) -> list[str]:
+    if isinstance(old, dict) and isinstance(new, dict):
+        keys = sorted(old.keys() | new.keys(), key=str)
+        return [
+            line
+            for key in keys
+            for line in _differences(old.get(key), new.get(key), f"{path}.{key}".lstrip("."))
+        ]
+    return [] if old == new else [f"{path}: {old!r} → {new!r}"]
+
+
+def _merged(base: Plain, overlay: Plain) -> Plain:
+    merged = dict(base)
+    for key, value in overlay.items():
+        nested = isinstance(value, dict) and isinstance(base.get(key), dict)
+        merged[key] = _merged(base[key], value) if nested else value
+    return merged

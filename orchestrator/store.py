@@ -1,0 +1,203 @@
+"""Content-addressed artifacts: written whole or not at all, checked on every read."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import io
+import json
+import os
+import shutil
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from safetensors import SafetensorError
+from safetensors.numpy import load as load_safetensors
+from safetensors.numpy import save as save_safetensors
+
+from orchestrator.errors import StorageError
+
+Arrays = dict[str, np.ndarray]
+
+
+class CorruptArtifactError(Exception):
+    """An artifact's bytes are not those that were written; it must be rebuilt."""
+
+
+@dataclass(frozen=True)
+class Artifact:
+    """Named arrays and a plain description: what builders return and the store keeps."""
+
+    arrays: Arrays
+    info: dict[str, Any]
+
+    @property
+    def digest(self) -> str:
+        """Hash of the content, independent of when and where it was made."""
+        content = hashlib.sha256()
+        for name, data in sorted(self.files().items()):
+            content.update(f"{name}:{len(data)}:".encode() + data)
+        return content.hexdigest()
+
+    def files(self) -> dict[str, bytes]:
+        """The content as files: datasets a .npy a column, so that they can be memory-mapped;
+        weights as one safetensors file."""
+        info = {"info.json": json.dumps(self.info, sort_keys=True).encode()}
+        if self.info.get("format") == "columns":
+            return info | {f"{name}.npy": _npy(array) for name, array in self.arrays.items()}
+        arrays = {name: np.ascontiguousarray(array) for name, array in self.arrays.items()}
+        return info | {"arrays.safetensors": save_safetensors(arrays)}
+
+
+class Store:
+    """A folder of artifacts by kind and key. Many runs may share it."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+
+    def path(self, kind: str, key: str) -> Path:
+        return self.root / kind / key
+
+    def __contains__(self, kind_and_key: tuple[str, str]) -> bool:
+        return (self.path(*kind_and_key) / "manifest.json").is_file()
+
+    def write(self, kind: str, key: str, artifact: Artifact, made: dict[str, Any]) -> str:
+        """Write under a temporary name, flush to disk, rename; returns the content digest.
+
+        `made` records how the artifact came to be (recipe, seconds); it is no part of the digest.
+        Raises StorageError when the disk is full; nothing half-written stays visible.
+        """
+        final = self.path(kind, key)
+        temporary = self.root / "incoming" / f"{key}-{uuid.uuid4().hex}"
+        files = artifact.files()
+        manifest = {
+            "digest": artifact.digest,
+            "files": {name: hashlib.sha256(data).hexdigest() for name, data in files.items()},
+            "made": made,
+        }
+        with storage_errors(self.root):
+            try:
+                temporary.mkdir(parents=True)
+                for name, data in files.items():
+                    write_durably(temporary / name, data)
+                text = json.dumps(manifest, sort_keys=True, indent=1)
+                write_durably(temporary / "manifest.json", text.encode())
+                final.parent.mkdir(parents=True, exist_ok=True)
+                shutil.rmtree(final, ignore_errors=True)
+                temporary.rename(final)
+                sync_folder(final.parent)
+            finally:
+                shutil.rmtree(temporary, ignore_errors=True)
+        return artifact.digest
+
+    def read(self, kind: str, key: str) -> Artifact:
+        """The artifact, every file's digest checked before any of it is used.
+
+        Raises CorruptArtifactError naming the file that is missing or damaged.
+        """
+        folder = self.path(kind, key)
+        manifest = self.manifest(kind, key)
+        contents = {}
+        for name, expected in manifest["files"].items():
+            try:
+                data = (folder / name).read_bytes()
+            except OSError as error:
+                raise CorruptArtifactError(f"{folder / name}: {error.strerror}") from error
+            if hashlib.sha256(data).hexdigest() != expected:
+                raise CorruptArtifactError(f"{folder / name}: content does not match its digest")
+            contents[name] = data
+        info = json.loads(contents.pop("info.json"))
+        return Artifact(_decode(contents, folder), info)
+
+    def manifest(self, kind: str, key: str) -> dict[str, Any]:
+        path = self.path(kind, key) / "manifest.json"
+        try:
+            manifest = json.loads(path.read_text())
+            if not {"digest", "files", "made"} <= manifest.keys():
+                raise CorruptArtifactError(f"{path}: incomplete")
+        except (OSError, ValueError, AttributeError) as error:
+            raise CorruptArtifactError(f"{path}: unreadable") from error
+        return manifest
+
+    def discard(self, kind: str, key: str) -> Path:
+        """Set a damaged artifact aside for inspection; it counts as missing from then on."""
+        aside = self.root / "corrupt" / f"{kind}-{key}-{uuid.uuid4().hex[:8]}"
+        with storage_errors(self.root):
+            aside.parent.mkdir(parents=True, exist_ok=True)
+            self.path(kind, key).rename(aside)
+        return aside
+
+    def artifacts(self) -> Iterator[tuple[str, str]]:
+        """All complete artifacts."""
+        for manifest in sorted(self.root.glob("*/*/manifest.json")):
+            if manifest.parent.parent.name not in ("incoming", "corrupt"):
+                yield manifest.parent.parent.name, manifest.parent.name
+
+
+def _npy(array: np.ndarray) -> bytes:
+    buffer = io.BytesIO()
+    np.save(buffer, np.ascontiguousarray(array), allow_pickle=False)
+    return buffer.getvalue()
+
+
+def _decode(contents: dict[str, bytes], folder: Path) -> Arrays:
+    """Arrays from checked bytes. Nothing is unpickled, whatever the files claim to be."""
+    try:
+        if "arrays.safetensors" in contents:
+            # safetensors hands out read-only views of the buffer; torch wants to own its memory.
+            loaded = load_safetensors(contents["arrays.safetensors"])
+            return {name: np.array(array) for name, array in loaded.items()}
+        return {
+            name.removesuffix(".npy"): np.load(io.BytesIO(data), allow_pickle=False)
+            for name, data in contents.items()
+        }
+    except (SafetensorError, ValueError) as error:
+        raise CorruptArtifactError(f"{folder}: {error}") from error
+
+
+def write_durably(path: Path, data: bytes) -> None:
+    """Write and flush to the device."""
+    with path.open("wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def write_atomically(path: Path, data: bytes) -> None:
+    """Replace a file so that a reader, or a crash, sees the old content or the new, whole."""
+    with storage_errors(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+        try:
+            write_durably(temporary, data)
+            temporary.replace(path)
+            sync_folder(path.parent)
+        finally:
+            temporary.unlink(missing_ok=True)
+
+
+def sync_folder(folder: Path) -> None:
+    """Make a rename in this folder survive a power cut."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+@contextmanager
+def storage_errors(where: Path) -> Iterator[None]:
+    """Turn what a full or read-only disk raises into StorageError."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EACCES):
+            raise StorageError(
+                f"cannot write {where}: {error.strerror}; make room and run the same command again"
+            ) from error
+        raise

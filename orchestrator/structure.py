@@ -1,0 +1,87 @@
+"""Frozen dataclasses from plain data and back: strict, typed, and without executing anything."""
+
+from __future__ import annotations
+
+import types
+from dataclasses import MISSING, fields, is_dataclass
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+
+from orchestrator.errors import UsageError
+
+T = TypeVar("T")
+Plain = dict[str, Any]  # what JSON and TOML can hold
+
+
+def structure(cls: type[T], plain: Any, where: str) -> T:
+    """Build `cls` from a dict. UsageError names the field and lists the valid ones."""
+    if not isinstance(plain, dict):
+        raise UsageError(f"{where}: expected a table of fields, got {plain!r}")
+    known = {field.name: field for field in fields(cls)}  # type: ignore[arg-type]
+    if unknown := [key for key in plain if key not in known]:
+        raise UsageError(f"{where}: unknown field {unknown[0]!r}; valid are {', '.join(known)}")
+    missing = [
+        name
+        for name, field in known.items()
+        if name not in plain and field.default is MISSING and field.default_factory is MISSING
+    ]
+    if missing:
+        raise UsageError(f"{where}: field {missing[0]!r} is missing")
+    hints = get_type_hints(cls)
+    return cls(
+        **{name: _value(hints[name], value, f"{where}, {name}") for name, value in plain.items()}
+    )
+
+
+def _value(hint: Any, value: Any, where: str) -> Any:
+    origin, args = get_origin(hint), get_args(hint)
+    if origin is Annotated:
+        return _value(args[0], value, where)
+    if origin in (Union, types.UnionType):
+        return _first_fitting(args, value, where)
+    if is_dataclass(hint):
+        return structure(hint, value, where)  # type: ignore[arg-type]
+    if origin is Literal:
+        if value not in args:
+            raise UsageError(f"{where}: {value!r} is not one of {', '.join(map(str, args))}")
+        return value
+    if origin is tuple:
+        if not isinstance(value, list | tuple):
+            raise UsageError(f"{where}: expected a list, got {value!r}")
+        return tuple(_value(args[0], item, f"{where}[{i}]") for i, item in enumerate(value))
+    if origin is dict:
+        if not isinstance(value, dict):
+            raise UsageError(f"{where}: expected a table, got {value!r}")
+        return {_key(args[0], k, where): _value(args[1], v, where) for k, v in value.items()}
+    if hint is float and isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    if type(value) is not hint:
+        raise UsageError(f"{where}: expected {hint.__name__}, got {value!r}")
+    return value
+
+
+def _first_fitting(options: tuple[Any, ...], value: Any, where: str) -> Any:
+    problems = []
+    for option in options:
+        try:
+            return _value(option, value, where)
+        except UsageError as error:
+            problems.append(str(error))
+    raise UsageError("; or ".join(problems))
+
+
+def _key(hint: type, text: Any, where: str) -> Any:
+    try:
+        return hint(text)  # TOML and JSON know only text as keys
+    except ValueError:
+        raise UsageError(f"{where}: key {text!r} is not {hint.__name__}") from None
+
+
+def to_plain(value: Any) -> Any:
+    """Dataclasses → dicts, tuples → lists, as JSON and TOML hold them."""
+    if is_dataclass(value):
+        return {field.name: to_plain(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, dict):
+        return {str(key): to_plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [to_plain(item) for item in value]
+    return value

@@ -1,0 +1,110 @@
+"""The work itself: the same in this process, in a Ray task and in a Ray actor."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import torch
+
+from orchestrator.builders import BUILDERS, Inputs, load_models
+from orchestrator.jobs import BlockReport, BlockTask, BuildJob, PlayJob, Report
+from orchestrator.ledger import Outcome
+from orchestrator.methods import make_stitcher
+from orchestrator.store import Artifact
+from orchestrator.structure import structure
+from stitching.data.transitions import DataError
+from stitching.envs.protocol import EpisodeBlock
+from stitching.envs.registry import BENCHMARKS
+from stitching.rollout import Play, RolloutConfig, begin, play_segment
+
+
+def use_one_thread() -> None:
+    """One thread a worker: more would change the bytes, and cost more than they gain."""
+    torch.set_num_threads(1)
+
+
+def build(job: BuildJob, inputs: Inputs) -> Report:
+    """Make an artifact; inputs by role. Trouble is reported, not raised."""
+    started = time.perf_counter()
+    try:
+        artifact = BUILDERS[job.recipe.kind].make(job.recipe.params, inputs)
+    except (DataError, FloatingPointError) as error:
+        return Report(job, trouble="bad data", error=str(error))
+    except Exception:
+        return Report(job, trouble="failed", error=traceback.format_exc(limit=-3))
+    return Report(job, artifact=artifact, seconds=time.perf_counter() - started)
+
+
+class BlockPlayer:
+    """Plays blocks; keeps loaded models and environment blocks between them, and nothing else."""
+
+    def __init__(self) -> None:
+        self._models: dict[tuple[str, str], Any] = {}
+        self._blocks: dict[str, EpisodeBlock] = {}
+
+    def play(self, job: PlayJob, artifacts: Mapping[str, Artifact]) -> Report:
+        """Every block of the job; one that fails does not touch the others. Artifacts by key."""
+        started = time.perf_counter()
+        reports = []
+        for task, parent in job.tasks:
+            began = time.perf_counter()
+            try:
+                outcome = self._play_block(task, parent, artifacts)
+                segments, seconds = len(outcome.arrays["episode"]), time.perf_counter() - began
+                reports.append(BlockReport(task.key, outcome.to_bytes(), "", segments, seconds))
+            except Exception:
+                reports.append(BlockReport(task.key, None, traceback.format_exc(limit=-3)))
+        return Report(job, blocks=tuple(reports), seconds=time.perf_counter() - started)
+
+    def _play_block(
+        self, task: BlockTask, parent: Outcome | None, artifacts: Mapping[str, Artifact]
+    ) -> Outcome:
+        benchmark = BENCHMARKS[task.benchmark]
+        models = {kind: self._model(task, kind, artifacts) for kind in task.artifacts}
+        agent = models["agent"]
+        stitcher = make_stitcher(task.method, task.stitcher, benchmark, agent, models)
+        episodes, used, snapshots = survivors(task, parent)
+        play = Play(
+            task.root_seed, task.benchmark, task.seed, task.method, tuple(episodes), task.prefix
+        )
+        block = self._blocks.setdefault(task.benchmark, benchmark.block())
+        begin(block, play, snapshots)
+        config = structure(RolloutConfig, task.rollout, "rollout")
+        segments = play_segment(
+            block, agent, stitcher, benchmark, config, play, task.step_limit - used
+        )
+        return Outcome(
+            {
+                "episode": np.array(episodes, dtype=np.int64),
+                "success": segments.success,
+                "stitch_steps": segments.stitch_steps,
+                "steps": segments.steps,
+                "end_step": used + segments.steps,
+                "value_start": segments.value_start,
+                "value_end": segments.value_end,
+                "snapshots": segments.snapshots[segments.success],
+            }
+        )
+
+    def _model(self, task: BlockTask, kind: str, artifacts: Mapping[str, Artifact]) -> Any:
+        key = task.artifacts[kind]
+        if (kind, key) not in self._models:
+            loaded = load_models(BENCHMARKS[task.benchmark], task.configs, {kind: artifacts[key]})
+            self._models[kind, key] = loaded[kind]
+        return self._models[kind, key]
+
+
+def survivors(
+    task: BlockTask, parent: Outcome | None
+) -> tuple[list[int], np.ndarray, np.ndarray | None]:
+    """Who plays a block: episodes, steps they have used (n,), and snapshots to go on from."""
+    if parent is None:
+        episodes = list(range(*task.episodes))
+        return episodes, np.zeros(len(episodes), dtype=np.int64), None
+    succeeded = parent.arrays["success"]
+    episodes = [int(episode) for episode in parent.arrays["episode"][succeeded]]
+    return episodes, parent.arrays["end_step"][succeeded], parent.arrays["snapshots"]

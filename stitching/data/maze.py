@@ -1,0 +1,86 @@
+"""Maze datasets: near-shortest paths from the spawn to each goal, and transitions of all kinds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stitching.data.transitions import NO_SKILL, Transitions
+from stitching.envs.maze import MOVES, Cell, Maze
+from stitching.streams import stream
+
+
+@dataclass(frozen=True)
+class MazeDataConfig:
+    episodes: int = 100  # demonstrations a skill
+    noise: float = 0.02  # probability of a random move in them
+    exploration_episodes: int = 200  # random walks from random cells, for the dynamics alone
+    exploration_steps: int = 20
+
+
+def distances(maze: Maze, goal: Cell) -> np.ndarray:
+    """Moves from each cell to the goal, (side, side) float64; inf in walls and out of reach."""
+    steps = np.full(maze.free.shape, np.inf)
+    steps[goal] = 0
+    frontier = [goal]
+    while frontier:
+        cell = frontier.pop(0)
+        for down, right in MOVES:
+            neighbour = (cell[0] + down, cell[1] + right)
+            if maze.free[neighbour] and np.isinf(steps[neighbour]):
+                steps[neighbour] = steps[cell] + 1
+                frontier.append(neighbour)
+    return steps
+
+
+def skill_demonstrations(maze: Maze, config: MazeDataConfig, seed: int) -> Transitions:
+    """Spawn → goal for every goal: the first shortest move, with a random one now and then.
+
+    Always the *first* shortest move, so that the four skills know narrow tracks of the maze and
+    not the whole of it: that is what makes stitching necessary (paper 4.1.1).
+    """
+    episodes = []
+    for skill, (name, goal) in enumerate(maze.goals):
+        rng = stream("demonstrations", maze.name, seed, name)
+        steps_left = distances(maze, goal)
+        for _ in range(config.episodes):
+            cells, moves = [maze.spawn], []
+            while cells[-1] != goal:
+                reached = [tuple(cell) for cell in maze.successors[cells[-1]]]
+                move = int(np.argmin([steps_left[cell] for cell in reached]))
+                if rng.random() < config.noise:
+                    move = int(rng.integers(len(MOVES)))
+                moves.append(move)
+                cells.append(reached[move])
+            episodes.append((cells, moves, skill))
+    return _as_transitions(maze, episodes)
+
+
+def exploration(maze: Maze, config: MazeDataConfig, seed: int) -> Transitions:
+    """Random walks from random free cells: "all kinds of transitions in the environment"."""
+    rng = stream("exploration", maze.name, seed)
+    free = np.argwhere(maze.free)
+    episodes = []
+    for _ in range(config.exploration_episodes):
+        cells = [tuple(free[rng.integers(len(free))])]
+        moves = [int(move) for move in rng.integers(len(MOVES), size=config.exploration_steps)]
+        for move in moves:
+            cells.append(tuple(maze.successors[cells[-1]][move]))
+        episodes.append((cells, moves, NO_SKILL))
+    return _as_transitions(maze, episodes)
+
+
+def _as_transitions(maze: Maze, episodes: list[tuple[list[Cell], list[int], int]]) -> Transitions:
+    before = np.array([cell for cells, _, _ in episodes for cell in cells[:-1]])
+    after = np.array([cell for cells, _, _ in episodes for cell in cells[1:]])
+    moves = np.array([move for _, moves, _ in episodes for move in moves])
+    skills = np.array([skill for _, _, skill in episodes], dtype=np.int64)
+    return Transitions(
+        observations=maze.observations[tuple(before.T)],
+        actions=np.eye(len(MOVES), dtype=np.float32)[moves],
+        next_observations=maze.observations[tuple(after.T)],
+        episode_ends=np.cumsum([len(moves) for _, moves, _ in episodes]),
+        episode_skills=skills,
+        episode_successes=skills != NO_SKILL,
+    )

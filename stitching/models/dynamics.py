@@ -1,0 +1,87 @@
+"""The dynamics ensemble T_φ(s'|s, a), trained on the union of all data (paper 3.1, B.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from stitching.data.transitions import Transitions
+from stitching.models.layers import init_mlp, mlp, parameters, prefixed
+from stitching.models.scale import observation_scale
+from stitching.models.training import CurveLog, Trained, cosine
+from stitching.streams import stream
+
+
+@dataclass(frozen=True)
+class DynamicsConfig:
+    """The paper gives "two or three layers" and the activation; the rest is ours."""
+
+    updates: int = 3_000
+    batch_size: int = 256
+    learning_rate: float = 1e-3
+    learning_rate_decay: bool = True  # cosine to 0
+    members: int = 5
+    width: int = 128
+    hidden_layers: int = 2
+    activation: str = "relu"  # relu in the maze, elu in Kitchen, sigmoid in Robosuite
+    log_every: int = 250
+
+
+class Dynamics:
+    """A trained ensemble, ready to predict. Each member rolls out its own imagined states."""
+
+    def __init__(self, weights: dict[str, np.ndarray], config: DynamicsConfig) -> None:
+        self._mean = torch.from_numpy(weights["observation_mean"])
+        self._std = torch.from_numpy(weights["observation_std"])
+        self._params = parameters(weights, "t")
+        self._activation = config.activation
+
+    def scaled(self, states: Tensor) -> Tensor:
+        """States in units of the data's standard deviation, per dimension."""
+        return states / self._std
+
+    def __call__(self, states: Tensor, actions: Tensor) -> Tensor:
+        """Next states: (D or 1, n, observation), (n, action) → (D, n, observation)."""
+        inputs = (states - self._mean) / self._std
+        inputs = torch.cat([inputs, actions.expand(len(inputs), -1, -1)], dim=-1)
+        members = self._params["w0"].shape[0]
+        change = mlp(self._params, inputs.expand(members, -1, -1), self._activation)
+        return states + change * self._std
+
+
+def train_dynamics(data: Transitions, config: DynamicsConfig, *labels: str | int) -> Trained:
+    """Minimise the squared error of the next state, per dimension in units of the data's scale.
+
+    The networks output the change of state, which is the same loss with an easier target. Members
+    differ by initial weights and by their own stream of minibatches.
+    """
+    mean, std = observation_scale(data.observations)
+    states = torch.from_numpy((np.asarray(data.observations) - mean) / std)
+    actions = torch.from_numpy(np.array(data.actions))
+    inputs = torch.cat([states, actions], dim=-1)
+    targets = torch.from_numpy((np.asarray(data.next_observations) - mean) / std) - states
+
+    sizes = [inputs.shape[1], *[config.width] * config.hidden_layers, states.shape[1]]
+    params = init_mlp(config.members, sizes, stream("init", *labels))
+    for parameter in params.values():
+        parameter.requires_grad_()
+    optimizer = torch.optim.Adam(params.values(), lr=config.learning_rate, fused=True)
+    batches = stream("batches", *labels)
+    log = CurveLog(config.updates, config.log_every)
+    for update in range(config.updates):
+        if config.learning_rate_decay:
+            rate = config.learning_rate * cosine(update, config.updates)
+            optimizer.param_groups[0]["lr"] = rate
+        index = torch.from_numpy(
+            batches.integers(len(data), size=(config.members, config.batch_size))
+        )
+        loss = (mlp(params, inputs[index], config.activation) - targets[index]).square().mean()
+        optimizer.zero_grad(set_to_none=True)
+        loss.backward()
+        optimizer.step()
+        log.record(update, {"prediction_loss": loss})
+    weights = {"observation_mean": mean, "observation_std": std, **prefixed(params, "t")}
+    return Trained(weights, log.curves)

@@ -1,0 +1,189 @@
+"""Implicit Q-learning (Kostrikov et al., 2022) with an ensemble of value functions, one policy.
+
+Table 6 gives the hyperparameters. A member of the ensemble is a pair of Q-functions with their
+slow targets and a value function V; all members learn in one stacked pass from the same batches
+and differ by their initial weights. The policy is extracted with the members' mean advantage.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from stitching.data.experience import Experience
+from stitching.envs.protocol import ActionSpace
+from stitching.models.layers import Params, init_mlp, mlp, prefixed
+from stitching.models.scale import observation_scale
+from stitching.models.training import CurveLog, Trained, cosine
+from stitching.streams import stream
+
+LOG_STD_RANGE = (-5.0, 2.0)
+MAX_ADVANTAGE_WEIGHT = 100.0  # as in the authors' implementation
+
+
+@dataclass(frozen=True)
+class IQLConfig:
+    """Table 6; widths, members and updates are ours, the paper gives none."""
+
+    updates: int = 10_000
+    batch_size: int = 256
+    learning_rate: float = 3e-4
+    learning_rate_decay: bool = True  # cosine to 0, policy only, as in the authors' implementation
+    dropout: float = 0.1  # policy only, likewise
+    gamma: float = 0.99
+    tau: float = 0.005
+    expectile: float = 0.7
+    temperature: float = 0.5
+    members: int = 5
+    width: int = 64
+    hidden_layers: int = 2
+    log_every: int = 500
+
+
+@dataclass(frozen=True)
+class Batch:
+    """One minibatch of B transitions; inputs are normalised observations next to conditions."""
+
+    inputs: Tensor  # (B, observation + condition)
+    actions: Tensor  # (B, action)
+    next_inputs: Tensor  # (B, observation + condition)
+    rewards: Tensor  # (B,)
+    continues: Tensor  # (B,) 0 where terminal, else 1
+
+
+def expectile_loss(difference: Tensor, expectile: float) -> Tensor:
+    """Eq. 5 of IQL: the asymmetric square |expectile − 1(u < 0)| u², elementwise."""
+    return torch.where(difference < 0, 1 - expectile, expectile) * difference.square()
+
+
+def twin_minimum(q: Tensor) -> Tensor:
+    """The smaller of each member's two Q-functions: (2M, B, 1) → (M, B)."""
+    return q.squeeze(-1).unflatten(0, (-1, 2)).amin(dim=1)
+
+
+def log_probability(outputs: Tensor, log_std: Tensor, actions: Tensor, discrete: bool) -> Tensor:
+    """log π(a|s): categorical over one-hot actions, or Gaussian around tanh(outputs). (B,)"""
+    if discrete:
+        return (outputs.log_softmax(-1) * actions).sum(-1)
+    log_std = log_std.clamp(*LOG_STD_RANGE)
+    scaled = (actions - outputs.tanh()) * torch.exp(-log_std)
+    return (-0.5 * scaled.square() - log_std - 0.5 * math.log(2 * math.pi)).sum(-1)
+
+
+def iql_losses(
+    q: Params,
+    q_target: Params,
+    v: Params,
+    policy: Params,
+    log_std: Tensor,
+    batch: Batch,
+    config: IQLConfig,
+    discrete: bool,
+    generator: torch.Generator,
+) -> dict[str, Tensor]:
+    """The three losses of IQL (its Eqs. 5, 6, 7), each averaged over batch and members."""
+    state_actions = torch.cat([batch.inputs, batch.actions], dim=-1)
+    with torch.no_grad():
+        q_slow = twin_minimum(mlp(q_target, state_actions))  # (M, B)
+        v_next = mlp(v, batch.next_inputs).squeeze(-1)  # (M, B)
+        backup = batch.rewards + config.gamma * batch.continues * v_next
+
+    v_now = mlp(v, batch.inputs).squeeze(-1)
+    value_loss = expectile_loss(q_slow - v_now, config.expectile).mean()
+
+    q_now = mlp(q, state_actions).squeeze(-1).unflatten(0, (-1, 2))  # (M, 2, B)
+    q_loss = (q_now - backup.unsqueeze(1)).square().mean()
+
+    advantage = (q_slow - v_now.detach()).mean(dim=0)  # (B,)
+    weight = (config.temperature * advantage).exp().clamp(max=MAX_ADVANTAGE_WEIGHT)
+    outputs = mlp(policy, batch.inputs, dropout=config.dropout, generator=generator).squeeze(0)
+    log_prob = log_probability(outputs, log_std, batch.actions, discrete)
+    return {
+        "value_loss": value_loss,
+        "q_loss": q_loss,
+        "policy_loss": -(weight * log_prob).mean(),
+        "mean_value": v_now.detach().mean(),
+        "value_disagreement": v_now.detach().std(dim=0, correction=0).mean(),
+    }
+
+
+def train_iql(
+    experience: Experience, actions: ActionSpace, config: IQLConfig, *labels: str | int
+) -> Trained:
+    """Learn value ensemble and policy; all randomness comes from streams named by `labels`.
+
+    Raises FloatingPointError when a loss stops being finite.
+    """
+    mean, std = observation_scale(experience.data.observations)
+    state = experience.data.observations.shape[1] + experience.conditions.shape[1]
+    hidden = [config.width] * config.hidden_layers
+    init = stream("init", *labels)
+    q = init_mlp(2 * config.members, [state + actions.size, *hidden, 1], init)
+    v = init_mlp(config.members, [state, *hidden, 1], init)
+    policy = init_mlp(1, [state, *hidden, actions.size], init)
+    log_std = torch.zeros(actions.size)
+    q_target = {name: weight.clone() for name, weight in q.items()}
+
+    critic = [*q.values(), *v.values()]
+    actor = [*policy.values(), log_std]
+    for parameter in (*critic, *actor):
+        parameter.requires_grad_()
+    optimizer = torch.optim.Adam(
+        [{"params": critic}, {"params": actor}], lr=config.learning_rate, fused=True
+    )
+    generator = torch.Generator().manual_seed(int(stream("dropout", *labels).integers(2**63)))
+
+    log = CurveLog(config.updates, config.log_every)
+    batches = minibatches(experience, mean, std, config.batch_size, stream("batches", *labels))
+    for update in range(config.updates):
+        if config.learning_rate_decay:
+            rate = config.learning_rate * cosine(update, config.updates)
+            optimizer.param_groups[1]["lr"] = rate
+        losses = iql_losses(
+            q, q_target, v, policy, log_std, next(batches), config, actions.discrete, generator
+        )
+        optimizer.zero_grad(set_to_none=True)
+        # The three losses share no parameters, so one backward pass serves them all.
+        (losses["value_loss"] + losses["q_loss"] + losses["policy_loss"]).backward()
+        optimizer.step()
+        torch._foreach_lerp_(list(q_target.values()), [w.detach() for w in q.values()], config.tau)
+        log.record(update, losses)
+
+    weights = {"observation_mean": mean, "observation_std": std}
+    for prefix, params in (("q", q), ("v", v), ("policy", policy | {"log_std": log_std})):
+        weights |= prefixed(params, prefix)
+    return Trained(weights, log.curves)
+
+
+def minibatches(
+    experience: Experience,
+    mean: np.ndarray,
+    std: np.ndarray,
+    batch_size: int,
+    rng: np.random.Generator,
+) -> Iterator[Batch]:
+    """Endless uniform minibatches, drawn with replacement."""
+    data = experience.data
+    observations = torch.from_numpy((np.asarray(data.observations) - mean) / std)
+    next_observations = torch.from_numpy((np.asarray(data.next_observations) - mean) / std)
+    actions = torch.from_numpy(np.array(data.actions))
+    rows = torch.from_numpy(experience.rows)
+    condition_ids = torch.from_numpy(experience.condition_ids)
+    conditions = torch.from_numpy(experience.conditions)
+    rewards = torch.from_numpy(experience.rewards)
+    continues = torch.from_numpy((~experience.terminals).astype(np.float32))
+    while True:
+        for index in torch.from_numpy(rng.integers(len(rows), size=(256, batch_size))):
+            row, condition = rows[index], conditions[condition_ids[index]]
+            yield Batch(
+                inputs=torch.cat([observations[row], condition], dim=-1),
+                actions=actions[row],
+                next_inputs=torch.cat([next_observations[row], condition], dim=-1),
+                rewards=rewards[index],
+                continues=continues[index],
+            )

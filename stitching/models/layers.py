@@ -1,0 +1,74 @@
+"""Ensembles of multi-layer perceptrons: stacked weights, one `baddbmm` a layer for all members."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+Params = dict[str, Tensor]
+
+ACTIVATIONS: dict[str, Callable[[Tensor], Tensor]] = {
+    "relu": F.relu,
+    "elu": F.elu,
+    "sigmoid": torch.sigmoid,
+}
+
+
+def init_mlp(members: int, sizes: Sequence[int], rng: np.random.Generator) -> Params:
+    """Weights `w0, b0, w1, b1, …` of `members` perceptrons with these layer sizes.
+
+    w: (members, in, out), b: (members, 1, out), both uniform in ± 1/√in (torch's own default for
+    linear layers), drawn from `rng` so that a model is a function of its recipe alone.
+    """
+    params: Params = {}
+    for layer, (fan_in, fan_out) in enumerate(pairwise(sizes)):
+        bound = 1 / math.sqrt(fan_in)
+        for kind, shape in (("w", (members, fan_in, fan_out)), ("b", (members, 1, fan_out))):
+            draw = rng.uniform(-bound, bound, size=shape).astype(np.float32)
+            params[f"{kind}{layer}"] = torch.from_numpy(draw)
+    return params
+
+
+def mlp(
+    params: Params,
+    inputs: Tensor,
+    activation: str = "relu",
+    dropout: float = 0.0,
+    generator: torch.Generator | None = None,
+) -> Tensor:
+    """All members on their inputs: (members, n, in) → (members, n, out).
+
+    Inputs of shape (n, in) are shown to every member. Dropout follows each hidden activation and
+    draws from `generator`.
+    """
+    layers = len(params) // 2
+    members = params["w0"].shape[0]
+    hidden = inputs.expand(members, -1, -1) if inputs.dim() == 2 else inputs
+    for layer in range(layers):
+        hidden = torch.baddbmm(params[f"b{layer}"], hidden, params[f"w{layer}"])
+        if layer < layers - 1:
+            hidden = ACTIVATIONS[activation](hidden)
+            if dropout:
+                keep = torch.empty_like(hidden).bernoulli_(1 - dropout, generator=generator)
+                hidden = hidden * keep / (1 - dropout)
+    return hidden
+
+
+def prefixed(params: Params, prefix: str) -> dict[str, np.ndarray]:
+    """Parameters as arrays named `prefix.name`, as checkpoints keep them."""
+    return {f"{prefix}.{name}": tensor.detach().numpy() for name, tensor in params.items()}
+
+
+def parameters(weights: Mapping[str, np.ndarray], prefix: str) -> Params:
+    """The parameters that `prefixed` named."""
+    return {
+        name.removeprefix(f"{prefix}."): torch.from_numpy(array)
+        for name, array in weights.items()
+        if name.startswith(f"{prefix}.")
+    }

@@ -1,0 +1,52 @@
+"""What a planner is: it turns a score of action sequences into one plan a problem.
+
+A *problem* is one episode that is waiting for a plan. All problems of a block are planned
+together, so scores are a few large tensor operations.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from torch import Tensor
+
+from stitching.envs.protocol import ActionSpace
+
+Score = Callable[[Tensor, Tensor], Tensor]
+"""score(problems, actions) -> scores, to be maximised.
+
+problems: (open,) int64, indices into `streams` of the problems that are still being planned.
+actions:  (open, population, horizon, action) float32, on the CPU.
+scores:   (open, population) float32, on the CPU.
+"""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The outcome of planning, one row a problem."""
+
+    actions: Tensor  # (problems, horizon, action) float32: what to execute
+    objective: Tensor  # (problems,) float32: the score of `actions`
+    iterations: Tensor  # (problems,) int64: populations sampled
+
+
+class Planner(Protocol):
+    """Searches for the action sequence with the highest score.
+
+    A planner is settings and nothing else, so that a spec can hold one: what it plans for arrives
+    with each call.
+    """
+
+    def plan(
+        self, score: Score, streams: Sequence[np.random.Generator], actions: ActionSpace
+    ) -> Plan:
+        """One plan for each stream.
+
+        A problem draws from its own stream only, and only as much as it needs itself, so its
+        plan does not depend on which other problems share the batch.
+
+        Raises:
+            ValueError: the planner cannot search actions of this kind.
+            FloatingPointError: no action sequence of some problem has a finite score.
+        """

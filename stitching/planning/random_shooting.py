@@ -1,0 +1,39 @@
+"""Random shooting: the planner of MazeRunner (appendix B.2)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from stitching.envs.protocol import ActionSpace
+from stitching.planning.protocol import Plan, Score
+from stitching.planning.ranking import rankable
+
+
+@dataclass(frozen=True)
+class RandomShooting:
+    """Draws action sequences uniformly and keeps the best; of equals, the first drawn."""
+
+    population: int = 200  # action sequences drawn a problem
+    horizon: int = 5  # actions in each sequence
+
+    @torch.no_grad()
+    def plan(
+        self, score: Score, streams: Sequence[np.random.Generator], actions: ActionSpace
+    ) -> Plan:
+        problems = torch.arange(len(streams))
+        sequences = self._draw(streams, actions)
+        scores = rankable(score(problems, sequences), problems)
+        best = scores.argmax(dim=1)
+        return Plan(sequences[problems, best], scores[problems, best], torch.ones_like(problems))
+
+    def _draw(self, streams: Sequence[np.random.Generator], actions: ActionSpace) -> Tensor:
+        """(problems, population, horizon, action), row by row from its own stream."""
+        shape = (self.population, self.horizon)
+        # np.stack would refuse an empty list: there may be no problem to plan for.
+        sequences = np.empty((len(streams), *shape, actions.size), dtype=np.float32)
+        for row, stream in zip(sequences, streams, strict=True):
+            row[:] = actions.uniform(stream, shape)
+        return torch.from_numpy(sequences)

@@ -1,0 +1,239 @@
+"""Algorithm 1 for a block of episodes, one skill at a time, from snapshot to snapshot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+import torch
+
+from stitching.envs.protocol import Benchmark, EpisodeBlock
+from stitching.models.agent import Agent
+from stitching.stitchers import Stitcher, policy_noise
+from stitching.streams import stream
+
+
+@dataclass(frozen=True)
+class RolloutConfig:
+    """How skills are executed; step limits of whole tasks belong to the spec."""
+
+    sample_actions: bool = False  # sample the policy; its mode otherwise, as in IQL's evaluation
+    execution_limit: int = 0  # most steps of one skill's execution; 0: only the task's own limit
+
+
+@dataclass(frozen=True)
+class Play:
+    """Which episodes a segment belongs to; names every stream of randomness it draws from."""
+
+    root_seed: int
+    benchmark: str
+    seed: int
+    method: str
+    episodes: tuple[int, ...]
+    prefix: tuple[str, ...]  # skills up to and including the one being played
+
+    def streams(self, purpose: str, *, by_method: bool = False) -> list[np.random.Generator]:
+        """One stream per episode. Only planners draw by method; the rest is common to all."""
+        method = (self.method,) if by_method else ()
+        task = ">".join(self.prefix)
+        return [
+            stream(purpose, self.root_seed, self.benchmark, self.seed, *method, episode, task)
+            for episode in self.episodes
+        ]
+
+
+@dataclass(frozen=True)
+class Segments:
+    """What happened to each of n episodes in one skill."""
+
+    success: np.ndarray  # (n,) bool
+    stitch_steps: np.ndarray  # (n,) int64
+    steps: np.ndarray  # (n,) int64, stitching included
+    value_start: np.ndarray  # (n,) float32, E[V] of this skill before the stitch
+    value_end: np.ndarray  # (n,) float32, and after it
+    snapshots: np.ndarray  # (n, snapshot) float64, at the segment's end
+
+
+class Recorder(Protocol):
+    """Is told of every step, for pictures and studies; changes nothing."""
+
+    def step(self, block: EpisodeBlock, rows: np.ndarray, skill: int, phase: str) -> None: ...
+
+
+@dataclass
+class _Progress:
+    """The moving parts of a segment."""
+
+    block: EpisodeBlock
+    skill: int
+    budget: np.ndarray  # (n,) steps each episode may still take
+    recorder: Recorder | None
+    steps: np.ndarray = field(init=False)
+    success: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        rows = np.arange(len(self.budget))
+        self.steps = np.zeros(len(rows), dtype=np.int64)
+        self.success = self.block.achieved(rows, self.skill)
+
+    def open(self, rows: np.ndarray) -> np.ndarray:
+        """Those of the rows that have neither achieved the skill nor used up their budget."""
+        return rows[~self.success[rows] & (self.steps[rows] < self.budget[rows])]
+
+    def step(self, rows: np.ndarray, actions: np.ndarray, phase: str) -> None:
+        self.block.step(rows, actions)
+        self.steps[rows] += 1
+        self.success[rows] = self.block.achieved(rows, self.skill)
+        if self.recorder is not None:
+            self.recorder.step(self.block, rows, self.skill, phase)
+
+
+@torch.inference_mode()
+def play_segment(
+    block: EpisodeBlock,
+    agent: Agent,
+    stitcher: Stitcher,
+    benchmark: Benchmark,
+    config: RolloutConfig,
+    play: Play,
+    budget: np.ndarray,
+    recorder: Recorder | None = None,
+) -> Segments:
+    """Stitch to the last skill of `play.prefix` and execute it, for all episodes together.
+
+    The block stands at a skill boundary. A skill counts as accomplished at the first step at which
+    its goal holds, stitching steps included. budget (n,) int64: steps left in each episode.
+    """
+    names = [skill.name for skill in benchmark.skills]
+    skill = names.index(play.prefix[-1])
+    rows = np.arange(len(play.episodes))
+    progress = _Progress(block, skill, budget, recorder)
+
+    value_start = _value(agent, block, rows, skill)
+    if len(play.prefix) > 1 and stitcher.limit:
+        _stitch(progress, agent, stitcher, play, names.index(play.prefix[-2]), value_start)
+    stitch_steps = progress.steps.copy()
+    value_end = _value(agent, block, rows, skill)
+    _execute(progress, agent, benchmark, config, play)
+    return Segments(
+        success=progress.success,
+        stitch_steps=stitch_steps,
+        steps=progress.steps,
+        value_start=value_start,
+        value_end=value_end,
+        snapshots=block.snapshot(rows),
+    )
+
+
+def _stitch(
+    progress: _Progress,
+    agent: Agent,
+    stitcher: Stitcher,
+    play: Play,
+    previous: int,
+    value: np.ndarray,
+) -> None:
+    """Stitching phase: until the next skill's value no longer rises, or the limit."""
+    streams = play.streams("planner", by_method=True)
+    value = value.copy()
+    rows = progress.open(np.arange(len(value)))
+    while len(rows):
+        actions = stitcher.propose(
+            torch.from_numpy(progress.block.observe(rows)),
+            previous,
+            progress.skill,
+            [streams[row] for row in rows],
+        )
+        moving, sequences = rows, actions
+        for step in range(actions.shape[1]):
+            progress.step(moving, sequences[:, step], "stitch")
+            still = progress.open(moving)
+            still = still[progress.steps[still] < stitcher.limit]
+            sequences = sequences[np.isin(moving, still)]
+            moving = still
+            if not len(moving):
+                break
+        rows = moving
+        new_value = _value(agent, progress.block, rows, progress.skill)
+        rising = new_value > value[rows]
+        value[rows] = new_value
+        rows = rows[rising]
+
+
+def _execute(
+    progress: _Progress,
+    agent: Agent,
+    benchmark: Benchmark,
+    config: RolloutConfig,
+    play: Play,
+) -> None:
+    """Execution phase: the skill's policy, until success or the end of the budget."""
+    streams = play.streams("policy")
+    limit = progress.steps + config.execution_limit
+    rows = progress.open(np.arange(len(play.episodes)))
+    while len(rows):
+        states = torch.from_numpy(progress.block.observe(rows))
+        noise = None
+        if config.sample_actions:
+            noise = policy_noise(benchmark.actions, [streams[row] for row in rows])
+        progress.step(rows, agent.act(states, progress.skill, noise), "execute")
+        rows = progress.open(rows)
+        if config.execution_limit:
+            rows = rows[progress.steps[rows] < limit[rows]]
+
+
+def _value(agent: Agent, block: EpisodeBlock, rows: np.ndarray, skill: int) -> np.ndarray:
+    """E[V] over the members, (n,) float32: what the stop rule watches on real states."""
+    if not len(rows):
+        return np.zeros(0, dtype=np.float32)
+    states = torch.from_numpy(block.observe(rows))
+    return agent.values(states, skill).mean(dim=0).numpy()
+
+
+def play_from_start(
+    block: EpisodeBlock,
+    agent: Agent,
+    stitcher: Stitcher,
+    benchmark: Benchmark,
+    config: RolloutConfig,
+    play: Play,
+    step_limit: int,
+    recorder: Recorder | None = None,
+) -> list[Segments]:
+    """The naive protocol: a whole task from the start, no tree; one `Segments` a skill.
+
+    Skill k's Segments covers the episodes that accomplished the k − 1 before it. The rollout tree
+    must give the same bytes.
+    """
+    episodes = np.array(play.episodes)
+    used = np.zeros(len(episodes), dtype=np.int64)
+    outcome: list[Segments] = []
+    for depth in range(1, len(play.prefix) + 1):
+        here = Play(
+            play.root_seed,
+            play.benchmark,
+            play.seed,
+            play.method,
+            tuple(int(e) for e in episodes),
+            play.prefix[:depth],
+        )
+        begin(block, here, outcome[-1].snapshots[outcome[-1].success] if outcome else None)
+        budget = step_limit - used
+        segments = play_segment(block, agent, stitcher, benchmark, config, here, budget, recorder)
+        outcome.append(segments)
+        used = (used + segments.steps)[segments.success]
+        episodes = episodes[segments.success]
+        if not len(episodes):
+            break
+    return outcome
+
+
+def begin(block: EpisodeBlock, play: Play, snapshots: np.ndarray | None) -> None:
+    """Put a block at the start of a segment: the benchmark's start state, or skill boundaries."""
+    streams: Sequence[np.random.Generator] = play.streams("environment")
+    if snapshots is None:
+        block.reset(streams)
+    else:
+        block.restore(snapshots, streams)

@@ -1,0 +1,67 @@
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from analysis.compare import COLUMNS, NothingToCompareError, compare, comparison_markdown
+
+
+@pytest.fixture
+def run_a(tmp_path: Path, write_run: Any) -> Path:
+    return write_run(tmp_path / "a")
+
+
+def test_a_run_equals_itself(run_a: Path) -> None:
+    comparison = compare(run_a, run_a)
+    assert comparison.columns.tolist() == COLUMNS
+    assert len(comparison) == 12
+    assert (comparison[["difference", "ci_low", "ci_high"]] == 0).all(axis=None)
+    assert comparison["pairs"].tolist() == [360] * 4 + [720] * 8
+
+
+def test_a_difference_is_found_and_paired(
+    run_a: Path, tmp_path: Path, segments: Any, write_run: Any
+) -> None:
+    worse = segments.copy()
+    worse.loc[(worse["method"] == "mb-stitch") & (worse["depth"] == 2), "success"] = False
+    run_b = write_run(tmp_path / "b", segments=worse)
+    comparison = compare(run_a, run_b).set_index(["row", "method"])
+    assert comparison.loc[("2 goals", "mb-stitch"), "score_b"] == 0.5
+    assert comparison.loc[("2 goals", "mb-stitch"), "ci_low"] > 0.4
+    assert comparison.loc[("2 goals", "no-stitch"), "difference"] == 0
+    text = comparison_markdown(comparison.reset_index(), "a", "b")
+    assert sum(line.endswith("| apart |") for line in text.splitlines()) == 3
+
+
+def test_only_common_episodes_count(
+    run_a: Path, tmp_path: Path, segments: Any, write_run: Any
+) -> None:
+    run_b = write_run(tmp_path / "b", segments=segments.query("seed < 2 and episode < 5"))
+    comparison = compare(run_a, run_b)
+    assert comparison["pairs"].tolist() == [12 * 2 * 5] * 4 + [24 * 2 * 5] * 8
+    assert set(comparison["seeds"]) == {2}
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"seeds": [7, 8]}, r"no seed in common \(0, 1, 2 against 7, 8\)"),
+        ({"methods": [{"name": "other"}]}, "no method in common"),
+        ({"tasks": ["g0"]}, "no task in common"),
+    ],
+)
+def test_says_why_nothing_can_be_compared(
+    run_a: Path, tmp_path: Path, spec_dict: Any, write_run: Any, change: Any, reason: str
+) -> None:
+    run_b = write_run(tmp_path / "b", spec={**spec_dict(), **change})
+    with pytest.raises(NothingToCompareError, match=reason):
+        compare(run_a, run_b)
+
+
+def test_an_unfinished_run_has_nothing_yet(
+    run_a: Path, tmp_path: Path, segments: pd.DataFrame, write_run: Any
+) -> None:
+    run_b = write_run(tmp_path / "b", segments=segments.query("depth == 1"))
+    with pytest.raises(NothingToCompareError, match="resume the one that is incomplete"):
+        compare(run_a, run_b)

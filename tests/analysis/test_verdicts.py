@@ -1,0 +1,84 @@
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis.episodes import episodes_from_segments
+from analysis.run import RunSpec
+from analysis.tables import Table, build_table
+from analysis.verdicts import (
+    AGREES,
+    FAILS,
+    HIGHER,
+    HOLDS,
+    LOWER,
+    NO_DATA,
+    NOT_PRINTED,
+    UNDECIDED,
+    cell_verdict,
+    claims,
+    error_reading,
+)
+
+
+@pytest.mark.parametrize(
+    ("score", "low", "high", "paper", "verdict"),
+    [
+        (0.50, 0.30, 0.70, 0.31, AGREES),
+        (0.50, 0.49, 0.51, 0.55, AGREES),
+        (0.50, 0.49, 0.51, 0.551, LOWER),
+        (0.50, 0.49, 0.51, 0.40, HIGHER),
+        (np.nan, np.nan, np.nan, 0.40, NO_DATA),
+        (0.50, 0.49, 0.51, np.nan, NOT_PRINTED),
+    ],
+)
+def test_cell_verdicts(score: float, low: float, high: float, paper: float, verdict: str) -> None:
+    assert cell_verdict(score, low, high, paper) == verdict
+
+
+@pytest.fixture(scope="module")
+def table(segments: Any, spec: RunSpec) -> Table:
+    return build_table(episodes_from_segments(segments, spec), spec, spec.tables[0])
+
+
+def test_claims_of_table_1(table: Table) -> None:
+    found = claims(table)
+    assert [claim.verdict for claim in found] == [HOLDS] * 4
+    assert found[0].text == "MB-Stitch leads “2 goals”"
+    assert "3 seeds, 360 paired episodes" in found[0].detail
+    assert found[3].text.startswith("No-Stitch accomplishes the same number of skills")
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "verdict"), [(-0.1, 0.1, UNDECIDED), (-0.2, -0.1, FAILS), (0.1, 0.2, HOLDS)]
+)
+def test_a_lead_is_judged_by_its_interval(
+    table: Table, low: float, high: float, verdict: str
+) -> None:
+    leads = table.leads[:1].assign(ci_low=low, ci_high=high)
+    assert claims(replace(table, leads=leads))[0].verdict == verdict
+
+
+def test_constant_skills_fail_when_they_grow(table: Table) -> None:
+    scores = table.scores.copy()
+    scores.loc[scores["method"] == "no-stitch", "score"] = 0.5
+    assert claims(replace(table, scores=scores))[-1].verdict == FAILS
+
+
+def test_table_2_does_not_claim_constant_skills(table: Table) -> None:
+    """The paper's No-Stitch goes from 0.448 to 0.500 accomplished skills there."""
+    kitchen = replace(table, entry=replace(table.entry, paper="2"))
+    assert not any("same number" in claim.text for claim in claims(kitchen))
+
+
+def test_reading_of_the_papers_error() -> None:
+    scores = pd.DataFrame(
+        {"score": 0.5, "variance": [0.0004, 0.0001], "std": [0.02, 0.01], "seeds": 3,
+         "paper_error": [0.0, 0.0]}
+    )  # fmt: skip
+    assert "variance over seeds in 2 of 2 cells" in error_reading(scores)
+    assert "the variance better" in error_reading(scores)
+    assert "One seed" in error_reading(scores.assign(seeds=1))
+    assert error_reading(scores.assign(paper_error=np.nan)) == ""
