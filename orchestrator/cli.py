@@ -92,7 +92,7 @@ def _with_spec(command: type[Any], name: str, words: list[str]) -> Any:
             words = [packaged_specs()[0], "--help"]
         else:
             raise UsageError(f"skillstitch {name} needs a spec: {', '.join(packaged_specs())}")
-    scale = "paper"
+    scale: Any = "paper"
     for word, following in zip(words, [*words[1:], ""], strict=True):
         if word == "--scale":
             scale = following
@@ -137,7 +137,7 @@ def _run(words: list[str]) -> None:
         try:
             reproduce(command.spec, settings, progress)
         except IncompleteError as error:
-            if not (out / "report" / "index.html").is_file():
+            if not (out / "finished").is_file():
                 raise
             incomplete = error
     if command.results is not None:

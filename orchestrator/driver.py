@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -93,7 +92,7 @@ class Builds:
             self._provide(self.plan.recipes[key])
         self.progress.phase("training", len(self.plan.recipes), len(present))
         available, submitted, seconds = set(present), set[str](), 0.0
-        while len(submitted) < len(missing) or self._in_flight(submitted, available):
+        while not set(missing) <= available:
             for key, recipe in missing.items():
                 if key not in submitted and set(recipe.inputs.values()) <= available:
                     self.executor.submit(BuildJob(recipe))
@@ -108,9 +107,6 @@ class Builds:
             else:
                 submitted.discard(recipe.key)
         return seconds
-
-    def _in_flight(self, submitted: set[str], available: set[str]) -> bool:
-        return not submitted <= available
 
     def _inputs_of(self, recipes: Iterable[Recipe]) -> set[str]:
         return {key for recipe in recipes for key in recipe.inputs.values()}
@@ -164,6 +160,8 @@ class Evaluation:
     seconds: float = 0.0  # that workers were busy playing
     _ready: deque[tuple[Node, int]] = field(default_factory=deque)
     _in_flight: int = 0
+    _attempts: dict[str, int] = field(default_factory=dict)  # failed ones, of this command
+    _given_up: set[str] = field(default_factory=set)
     _alone: set[str] = field(default_factory=set)  # blocks whose worker died: to be sent singly
 
     def run(self) -> None:
@@ -171,14 +169,12 @@ class Evaluation:
         self.progress.phase("evaluation", len(self.plan.tasks), 0)
         self._place = {task.key: place for place, task in self.plan.tasks.items()}
         self._adopt()
-        provided = False
         for root in self.plan.roots():
             for chunk in range(len(self.plan.chunks)):
                 self._expand(root, chunk)
+        if self._ready:
+            self._provide_models()
         while self._ready or self._in_flight:
-            if not provided:
-                self._provide_models()
-                provided = True
             self._dispatch()
             self._receive(self.executor.next())
 
@@ -187,9 +183,6 @@ class Evaluation:
         missing = [key for key in self._place if key not in self.ledger.finished()]
         self.ledger.record(self.shared.raw(missing))
         self._finished = self.ledger.finished()
-        self._given_up = {
-            key for key, (attempts, _) in self.ledger.failures().items() if attempts >= ATTEMPTS
-        } - self._finished
 
     def _provide_models(self) -> None:
         keys = {key for task in self.plan.tasks.values() for key in task.artifacts.values()}
@@ -280,30 +273,21 @@ class Evaluation:
             self.shared.add_cost(name, segments, seconds)
 
     def _failed(self, key: str, error: str, *, single: bool) -> None:
-        """Count a failure and queue the block again, or give it up after three.
+        """Count a failure and queue the block again, or give it up after three attempts.
+
+        The next command tries again what this one gave up.
 
         When a worker dies with several blocks, any of them may be innocent: they are then sent
         one by one, and only deaths alone count.
         """
         node, chunk = self._place[key]
-        if single and self.ledger.record_failure(key, error) >= ATTEMPTS:
+        if single:
+            self.ledger.record_failure(key, error)
+            self._attempts[key] = self._attempts.get(key, 0) + 1
+        if self._attempts.get(key, 0) >= ATTEMPTS:
             self._given_up.add(key)
             name = self.plan.tasks[node, chunk].name
             self.progress.say(f"given up after {ATTEMPTS} attempts: {name}: {error.strip()}")
             self.progress.advance(1 + self._descendants(node))
         else:
             self._ready.append((node, chunk))
-
-
-class Stopwatch:
-    """Wall-clock seconds by phase."""
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-        self._last = time.perf_counter()
-
-    def lap(self, phase: str) -> None:
-        """Everything since the last lap belongs to this phase."""
-        now = time.perf_counter()
-        self.seconds[phase] = self.seconds.get(phase, 0.0) + now - self._last
-        self._last = now

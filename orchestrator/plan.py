@@ -97,7 +97,7 @@ class Plan:
             "step_limit": spec.step_limit,
             "rollout": to_plain(spec.rollout),
             "artifacts": artifacts,
-            "configs": {"dynamics": to_plain(spec.dynamics)},
+            "configs": {kind: to_plain(spec.dynamics) for kind in artifacts if kind == "dynamics"},
         }
         key = digest(content | {"code": code_fingerprint(BLOCK_CODE)})
         return BlockTask(key=key, **content)

@@ -75,7 +75,7 @@ def summary_lines(directory: RunDirectory) -> Iterator[str]:
         yield (directory.path / "report" / f"{table.id}.md").read_text().strip()
         yield ""
     record = directory.read_json("provenance.json")
-    timings = ", ".join(f"{phase} {seconds:.0f} s" for phase, seconds in record["timings"].items())
+    timings = ", ".join(f"{phase} {seconds:.0f} s" for phase, seconds in record["seconds"].items())
     yield f"time: {timings}"
     yield f"report: {directory.path / 'report' / 'index.html'}"
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from analysis.episodes import write_episodes
 from analysis.report import build_report
 from orchestrator import tracking
-from orchestrator.driver import Builds, Evaluation, Progress, Stopwatch, verified_artifacts
-from orchestrator.errors import IncompleteError
+from orchestrator.driver import Builds, Evaluation, Progress, verified_artifacts
+from orchestrator.errors import IncompleteError, SkillstitchError
 from orchestrator.executors import ExecutorKind, open_executor
 from orchestrator.executors.protocol import Executor
 from orchestrator.exports import write_readable
@@ -21,8 +21,8 @@ from orchestrator.plan import make_plan
 from orchestrator.provenance import provenance
 from orchestrator.rundir import RunDirectory
 from orchestrator.spec import Spec
+from orchestrator.stopwatch import Stopwatch
 from orchestrator.store import Artifact, Store, storage_errors
-from orchestrator.structure import Plain
 
 NO_TRACKING = "none"
 
@@ -86,30 +86,34 @@ def reproduce(spec: Spec, settings: Settings, progress: Progress) -> RunDirector
     with directory.locked():
         run_id = directory.settle(spec)
         uri = settings.resolved_tracking_uri()
-        if _work(spec, settings, directory, run_id, progress):
-            _write_report(directory, progress)
+        try:
+            _carry_out(spec, settings, directory, run_id, progress)
+        except SkillstitchError:
+            publish(directory, uri, failed=True)
+            raise
         if trouble := publish(directory, uri, finished=True):
             progress.say(f"tracking: {trouble}")
         if given_up := directory.read_json("quarantine.json"):
             raise IncompleteError(
                 f"{len(given_up)} blocks were given up after repeated failures (see "
-                f"{directory.path / 'quarantine.json'}); the tables are marked as partial"
+                f"{directory.path / 'quarantine.json'}); the tables are marked as partial, and the "
+                "same command tries again"
             )
     return directory
 
 
-def _work(
+def _carry_out(
     spec: Spec, settings: Settings, directory: RunDirectory, run_id: str, progress: Progress
-) -> bool:
-    """Build and play whatever is missing; False when the run was complete before."""
+) -> None:
+    """Build and play whatever is missing, and write it up; nothing, if the run is complete."""
     watch = Stopwatch()
     plan = make_plan(spec)
     store, ledger = Store(settings.store), directory.ledger()
     shared = Ledger(settings.store / "blocks.sqlite")
     present = verified_artifacts(plan, store, ledger, progress)
-    evaluation_done = (directory.path / "report" / "index.html").is_file()
-    if evaluation_done and present == set(plan.recipes):
-        return False
+    if directory.finished and present == set(plan.recipes):
+        return
+    directory.mark(finished=False)
     directory.write_json("provenance.json", provenance() | {"run_id": run_id})
     announcement = _announce(directory, settings.resolved_tracking_uri())
     executor = LazyExecutor(settings)
@@ -124,37 +128,31 @@ def _work(
     finally:
         executor.close()
         announcement.join()
+    first_phase = "training" if busy_training else "evaluation"
+    watch.move(executor.seconds_to_open, first_phase, "starting workers")
     with storage_errors(directory.path):
         counts = write_readable(plan, store, ledger, directory)
         episodes = write_episodes(directory.path)
-    counts["episodes"] = len(episodes)
-    counts["environment steps without the tree"] = int(episodes["steps"].sum())
-    watch.lap("writing")
-    watch.seconds["training"] -= executor.seconds_to_open
-    timings: Plain = {"starting workers": executor.seconds_to_open} | watch.seconds
-    directory.write_json(
-        "provenance.json",
-        provenance()
-        | {
-            "run_id": run_id,
-            "executor": settings.executor,
-            "workers": executor.opened.workers if executor.opened else 0,
-            "timings": {phase: round(seconds, 1) for phase, seconds in timings.items()},
-            "busy worker seconds": {
-                "training": round(busy_training, 1),
-                "evaluation": round(evaluation.seconds, 1),
+        counts["episodes"] = len(episodes)
+        counts["environment steps without the tree"] = int(episodes["steps"].sum())
+        watch.lap("stopping workers and writing")
+        directory.write_json(
+            "provenance.json",
+            provenance()
+            | {
+                "run_id": run_id,
+                "executor": settings.executor,
+                "workers": executor.opened.workers if executor.opened else 0,
+                "seconds": {phase: round(s, 1) for phase, s in watch.seconds.items()},
+                "busy worker seconds": {
+                    "training": round(busy_training, 1),
+                    "evaluation": round(evaluation.seconds, 1),
+                },
+                "counts": counts,
             },
-            "counts": counts,
-        },
-    )
-    return True
-
-
-def _write_report(directory: RunDirectory, progress: Progress) -> None:
-    started = time.perf_counter()
-    with storage_errors(directory.path):
+        )
         build_report(directory.path)
-    progress.say(f"report written in {time.perf_counter() - started:.1f} s")
+    directory.mark(finished=True)
 
 
 def _announce(directory: RunDirectory, uri: str) -> threading.Thread:
@@ -162,16 +160,18 @@ def _announce(directory: RunDirectory, uri: str) -> threading.Thread:
 
     Its outcome does not matter: whatever is missed now, the last publication brings.
     """
-    thread = threading.Thread(target=publish, args=(directory, uri), kwargs={"finished": False})
+    thread = threading.Thread(target=publish, args=(directory, uri))
     thread.start()
     return thread
 
 
-def publish(directory: RunDirectory, uri: str, *, finished: bool) -> str:
+def publish(
+    directory: RunDirectory, uri: str, *, finished: bool = False, failed: bool = False
+) -> str:
     """Bring MLflow's view of a run up to date; returns what went wrong, "" if nothing did."""
     if uri == NO_TRACKING:
         return ""
-    outcome = tracking.publish(directory.path, uri, finished=finished)
+    outcome = tracking.publish(directory.path, uri, finished=finished, failed=failed)
     return "" if outcome.ok else f"{outcome.error}; the next command publishes what was missed"
 
 
@@ -180,5 +180,4 @@ def catch_up(directory: RunDirectory) -> str:
     if not (directory.path / "tracking.json").is_file():
         return ""
     uri = directory.read_json("tracking.json")["uri"]
-    finished = (directory.path / "report" / "index.html").is_file()
-    return publish(directory, uri, finished=finished)
+    return publish(directory, uri, finished=directory.finished)

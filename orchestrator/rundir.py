@@ -29,17 +29,27 @@ class RunDirectory:
     ledger.sqlite     every finished block
     provenance.json   where, when and with what it was made
     segments.parquet, episodes.parquet, training.json, datasets.json, showcase.json, report/
+    quarantine.json   blocks that were given up
+    finished          there when all of the above is
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
-    @property
-    def ledger_path(self) -> Path:
-        return self.path / "ledger.sqlite"
-
     def ledger(self, *, read_only: bool = False) -> Ledger:
-        return Ledger(self.ledger_path, read_only=read_only)
+        return Ledger(self.path / "ledger.sqlite", read_only=read_only)
+
+    @property
+    def finished(self) -> bool:
+        """Whether everything is played and reported, with nothing given up."""
+        return (self.path / "finished").is_file() and not self.read_json("quarantine.json")
+
+    def mark(self, *, finished: bool) -> None:
+        """Say that the readable files are complete, or that they are about to change."""
+        if finished:
+            write_atomically(self.path / "finished", b"")
+        else:
+            (self.path / "finished").unlink(missing_ok=True)
 
     @contextmanager
     def locked(self) -> Iterator[None]:

@@ -30,13 +30,13 @@ if TYPE_CHECKING:
     from mlflow import MlflowClient
     from mlflow.entities import Run
 
-    from analysis.run import RunSpec
-    from analysis.tables import Table
+    from analysis.run import RunSpec, TableEntry
 
 Status = Literal["RUNNING", "FINISHED", "FAILED"]
 Curves = dict[str, list[tuple[int, float]]]
 
 RUN_ID, METHOD, SEED = IDENTITY = ("skillstitch.run_id", "skillstitch.method", "skillstitch.seed")
+NOTE = "mlflow.note.content"  # the description that MLflow shows at the top of a run
 CONTENT = "skillstitch.content"  # tag set after all else: it vouches that nothing is missing
 
 SETTINGS = {
@@ -49,6 +49,9 @@ SETTINGS = {
 TURN_SECONDS = 30.0  # wait for another skillstitch that writes to the same SQLite store
 LOCK_SECONDS = 10.0  # wait for any other program that has locked it
 PUBLISH_SECONDS = 90.0  # after this a slow server gets the rest at the next publish
+
+DATED = ("provenance.json", "report/index.html")
+"""Files that tell when they were written, and so cannot tell whether there is anything new."""
 
 LONGEST_TEXT = 500  # of a param or tag: what every MLflow version takes
 LONGEST_KEY = 250
@@ -113,7 +116,7 @@ def pending(run_dir: Path, uri: str) -> bool:
     return (
         receipt is None
         or receipt.uri != without_password(uri)
-        or receipt.published != digest(_published_files(run_dir))
+        or receipt.published != _news(run_dir)
         or _store_is_gone(uri)
     )
 
@@ -144,8 +147,7 @@ def publish(run_dir: Path, uri: str, *, finished: bool, failed: bool = False) ->
 
 
 def _publish(run_dir: Path, uri: str, status: Status) -> PublishOutcome:
-    files = _published_files(run_dir)
-    wanted = Receipt(without_password(uri), digest(files), status)
+    wanted = Receipt(without_password(uri), _news(run_dir), status)
     # Results that were complete stay so, whatever became of a later command that added nothing.
     settled = (wanted, replace(wanted, status="FINISHED"))
     if _read_receipt(run_dir) in settled and not _store_is_gone(uri):
@@ -155,6 +157,7 @@ def _publish(run_dir: Path, uri: str, status: Status) -> PublishOutcome:
     with _turn_to_write(uri):
         client = _client(uri)
         experiment = _experiment(client, uri, f"skillstitch/{parent.tags['skillstitch.benchmark']}")
+        files = _published_files(run_dir)
         _Publisher(client, experiment, files, parent.identity[0]).write(parent, children)
     _write_receipt(run_dir, wanted)
     return PublishOutcome(ok=True)
@@ -171,18 +174,15 @@ def read_views(run_dir: Path, status: Status) -> list[RunView]:
     provenance = _read_json(run_dir / "provenance.json", {})
     training = _read_json(run_dir / "training.json", [])
     spec = RunSpec.from_dict(plain)
-    episodes = _read_episodes(run_dir)
-    tables = _tables(episodes, spec)
-    tags, params = _tags(spec, provenance), _params(plain)
     parent = RunView(
         name=f"{spec.name} {spec.scale}",
         status=status,
         identity=(provenance["run_id"], "", ""),
-        tags=tags | {"mlflow.note.content": spec.title, "skillstitch.run_dir": str(run_dir)},
-        params=params,
+        tags=_tags(spec, provenance) | {NOTE: spec.title, "skillstitch.run_dir": str(run_dir)},
+        params={_key(name): _text(value) for name, value in _leaves(plain["spec"], ".").items()},
         numbers=_finite(
-            *(_leaves(provenance.get(part, {}), part, "/") for part in ("timings", "counts")),
-            *(_scores(table, by_method=True) | _gains(table) for table in tables),
+            *(_leaves({part: provenance.get(part, {})}, "/") for part in ("timings", "counts")),
+            *(_reported(run_dir / "report", entry.id) for entry in spec.tables),
         ),
         curves={},
         datasets=_read_json(run_dir / "datasets.json", []),
@@ -192,6 +192,7 @@ def read_views(run_dir: Path, status: Status) -> list[RunView]:
             if name in ("spec.json", "provenance.json") or name.startswith("report/")
         },
     )
+    episodes = _read_episodes(run_dir)
     played = dict(list(episodes.groupby(["method", "seed"])))
     children = [
         _child(parent, spec, method, seed, training, played.get((method, seed), episodes.iloc[:0]))
@@ -209,27 +210,18 @@ def _child(
     training: list[dict[str, Any]],
     episodes: pd.DataFrame,
 ) -> RunView:
-    """One method under one seed; its scores are named alike for all, so that they can be compared.
-
-    Its intervals cover tasks and episodes, as there is one seed.
-    """
+    """One method under one seed, its metrics named as all others' so that they can be compared."""
     alone = replace(spec, methods={method: spec.methods[method]}, seeds=(seed,))
-    tables = _tables(episodes, alone)
+    numbers = _finite(*(_seed_scores(episodes, alone, entry) for entry in spec.tables))
     return RunView(
         name=f"{method} seed {seed}",
-        status="FAILED" if parent.status == "FAILED" and not tables else "FINISHED",
+        status="FAILED" if parent.status == "FAILED" and not numbers else "FINISHED",
         identity=(parent.identity[0], method, str(seed)),
-        tags={k: v for k, v in parent.tags.items() if not k.startswith("mlflow.note")},
+        tags={name: value for name, value in parent.tags.items() if name != NOTE},
         params=parent.params | _overrides(method) | {"method": method, "seed": str(seed)},
-        numbers=_finite(*(_scores(table, by_method=False) for table in tables)),
+        numbers=numbers,
         curves=_curves(method, seed, training),
     )
-
-
-def _tables(episodes: pd.DataFrame, spec: RunSpec) -> list[Table]:
-    from analysis.tables import build_table
-
-    return [build_table(episodes, spec, entry) for entry in spec.tables if len(episodes)]
 
 
 def _tags(spec: RunSpec, provenance: Mapping[str, Any]) -> dict[str, str]:
@@ -240,13 +232,9 @@ def _tags(spec: RunSpec, provenance: Mapping[str, Any]) -> dict[str, str]:
         "skillstitch.benchmark": spec.benchmark,
         "skillstitch.scale": spec.scale,
         "skillstitch.cpu": provenance.get("cpu"),
-        **_leaves(provenance.get("versions", {}), "version", "."),
+        **_leaves({"version": provenance.get("versions", {})}, "."),
     }
     return {name: _text(value) for name, value in tags.items() if value}
-
-
-def _params(plain: Mapping[str, Any]) -> dict[str, str]:
-    return {_key(name): _text(value) for name, value in _leaves(plain, "", ".").items()}
 
 
 def _overrides(method: str) -> dict[str, str]:
@@ -255,23 +243,45 @@ def _overrides(method: str) -> dict[str, str]:
     return {f"{name}.{key}": value for key, value in re.findall(r"([\w.]+)=([^,\]]+)", method)}
 
 
-def _scores(table: Table, *, by_method: bool) -> dict[str, float]:
-    return {
-        "/".join([table.entry.id, cell["row"], *([cell["method"]] * by_method), column]): cell[
-            column
-        ]
-        for cell in table.scores.to_dict("records")
+def _reported(report: Path, table: str) -> dict[str, float]:
+    """Scores and gains as the report gives them; nothing before there is a report."""
+    import pandas as pd
+
+    scores, gains = report / f"{table}.csv", report / f"{table}-gains.csv"
+    if not (scores.is_file() and gains.is_file()):
+        return {}
+    reported = {
+        f"{table}/{cell['row']}/{cell['method']}/{column}": cell[column]
+        for cell in pd.read_csv(scores).to_dict("records")
         for column in ("score", "ci_low", "ci_high", "episodes")
+    }
+    return reported | {
+        f"{table}/{duel['row']}/{duel['method']} over {duel['baseline']}/{column}": duel[column]
+        for duel in pd.read_csv(gains).to_dict("records")
+        for column in ("gain", "ci_low", "ci_high")
     }
 
 
-def _gains(table: Table) -> dict[str, float]:
+def _seed_scores(episodes: pd.DataFrame, spec: RunSpec, entry: TableEntry) -> dict[str, float]:
+    """Scores of one seed by the table's rows, every task weighing the same.
+
+    The interval takes tasks as given and a score for a rate: as no score in [0, 1] varies more
+    than successes and failures of the same mean do, it errs on the wide side.
+    """
+    from analysis.rows import place_tasks
+    from analysis.statistics import wilson
+
+    places = place_tasks(spec, entry)[["task", "row"]]
+    tasks = episodes.merge(places, on="task").groupby(["row", "task"])["score"]
+    rows = tasks.agg(["mean", "size"]).groupby("row").agg({"mean": "mean", "size": "sum"})
+    low, high = wilson(rows["mean"].to_numpy() * rows["size"].to_numpy(), rows["size"].to_numpy())
+    cells = rows.rename(columns={"mean": "score", "size": "episodes"}).assign(
+        ci_low=low, ci_high=high
+    )
     return {
-        f"{table.entry.id}/{duel['row']}/{duel['method']} over {duel['baseline']}/{column}": duel[
-            column
-        ]
-        for duel in table.gains.to_dict("records")
-        for column in ("gain", "ci_low", "ci_high")
+        f"{entry.id}/{row}/{column}": value
+        for row, cell in cells.to_dict("index").items()
+        for column, value in cell.items()
     }
 
 
@@ -300,12 +310,15 @@ def _finite(*parts: Mapping[str, Any]) -> dict[str, float]:
     }
 
 
-def _leaves(plain: Mapping[str, Any], prefix: str, separator: str) -> dict[str, Any]:
+def _leaves(plain: Mapping[str, Any], separator: str) -> dict[str, Any]:
     """Nested dicts as one, their keys joined."""
     leaves: dict[str, Any] = {}
-    for key, value in plain.items():
-        name = f"{prefix}{separator}{key}" if prefix else str(key)
-        leaves |= _leaves(value, name, separator) if isinstance(value, dict) else {name: value}
+    for name, value in plain.items():
+        if isinstance(value, dict):
+            below = _leaves(value, separator).items()
+            leaves |= {f"{name}{separator}{key}": leaf for key, leaf in below}
+        else:
+            leaves[name] = value
     return leaves
 
 
@@ -341,6 +354,12 @@ def _published_files(run_dir: Path) -> dict[str, Path]:
     names = ("spec.json", "provenance.json", "training.json", "datasets.json", "episodes.parquet")
     paths = [run_dir / name for name in names] + sorted((run_dir / "report").rglob("*"))
     return {str(path.relative_to(run_dir)): path for path in paths if path.is_file()}
+
+
+def _news(run_dir: Path) -> str:
+    """What a publish depends on, as a digest."""
+    files = _published_files(run_dir)
+    return digest({name: path for name, path in files.items() if name not in DATED})
 
 
 def digest(files: Mapping[str, Path]) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+import torch
 from torch import Tensor
 
 from stitching.envs.protocol import ActionSpace
@@ -118,18 +119,39 @@ class MBStitch:
         """Eq. 2 at the end of each imagined action sequence, every member on its own path."""
 
         def score(problems: Tensor, actions: Tensor) -> Tensor:
-            population, horizon = actions.shape[1], actions.shape[2]
+            population = actions.shape[1]
+            starts = states[problems].repeat_interleave(population, dim=0)
             sequences = actions.flatten(0, 1)  # (problems · population, horizon, action)
-            imagined = states[problems].repeat_interleave(population, dim=0).unsqueeze(0)
-            for step in range(horizon):
-                imagined = self.dynamics(imagined, sequences[:, step])  # (D, n, observation)
-            values = self.agent.values(imagined.mean(dim=0), following)  # (M, n)
-            scores = conservative_value(
-                values, self.dynamics.scaled(imagined), self.alpha, self.beta, self.norm
-            )
-            return scores.unflatten(0, (-1, population))
+            if self.actions.discrete:
+                # Few distinct sequences, and often one start for all: imagine each but once.
+                starts, sequences, inverse = distinct(starts, sequences)
+                return self._imagine(starts, sequences, following)[inverse].unflatten(
+                    0, (-1, population)
+                )
+            return self._imagine(starts, sequences, following).unflatten(0, (-1, population))
 
         return score
+
+    def _imagine(self, starts: Tensor, sequences: Tensor, following: int) -> Tensor:
+        """Eq. 2 after each sequence: (n, observation), (n, horizon, action) → (n,)."""
+        imagined = starts.unsqueeze(0)
+        for step in range(sequences.shape[1]):
+            imagined = self.dynamics(imagined, sequences[:, step])  # (D, n, observation)
+        return conservative_value(
+            self.agent.values(imagined.mean(dim=0), following),  # (M, n)
+            self.dynamics.scaled(imagined),
+            self.alpha,
+            self.beta,
+            self.norm,
+        )
+
+
+def distinct(starts: Tensor, sequences: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    """Distinct pairs of start and sequence, and where each of the n given pairs went, (n,)."""
+    pairs = torch.cat([starts, sequences.flatten(1)], dim=1)
+    unique, inverse = pairs.unique(dim=0, return_inverse=True)
+    width = starts.shape[1]
+    return unique[:, :width], unique[:, width:].unflatten(1, sequences.shape[1:]), inverse
 
 
 def policy_noise(actions: ActionSpace, streams: Sequence[np.random.Generator]) -> np.ndarray:

@@ -72,7 +72,8 @@ class RayExecutor:
         self._owned = not ray.is_initialized()
         if self._owned:
             _start(workers, address)
-        self.workers = workers or int(ray.cluster_resources().get("CPU", 1))
+        self._most_workers = workers
+        self.workers = self._capacity()
         self._references: dict[str, Any] = {}
         self._seats: list[_Seat] = []
         self._waiting: deque[PlayJob] = deque()
@@ -102,6 +103,7 @@ class RayExecutor:
             report = Report(flight.job, trouble="lost", error=_first_line(error))
             if flight.seat in self._seats:
                 self._seats.remove(flight.seat)
+            self.workers = self._capacity()
         self._seat_waiting()
         return report
 
@@ -112,6 +114,11 @@ class RayExecutor:
         self._flights.clear()
         if self._owned:
             ray.shutdown()
+
+    def _capacity(self) -> int:
+        """Cores of all nodes that are alive, up to what was asked for."""
+        cores = max(1, int(ray.cluster_resources().get("CPU", 1)))
+        return min(cores, self._most_workers or cores)
 
     def _seat_waiting(self) -> None:
         """Hand waiting jobs to the least busy actors, hiring actors up to the number of workers."""

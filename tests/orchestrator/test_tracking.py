@@ -7,6 +7,7 @@ import socket
 import sqlite3
 import subprocess
 import sys
+import threading
 import time
 import urllib.request
 from collections.abc import Callable, Iterator
@@ -18,6 +19,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from analysis.run import RunSpec
+from analysis.tables import build_table
+from analysis.writers import to_csv
 from orchestrator import tracking
 from orchestrator.tracking import CONTENT, METHOD, RUN_ID, SEED, default_uri, pending, publish
 
@@ -40,7 +44,7 @@ def make_spec() -> dict:
         "tasks": [">".join(task) for n in (2, 3) for task in permutations(SKILLS, n)],
         "step_limits": {"2": 50, "3": 50},
         "tables": [{"id": "table1", "paper": "1", "rows": "length", "noun": "goals", "title": "T"}],
-        "mb_stitch": {"alpha": 1.0, "cem": {"population": 50}},
+        "spec": {"episodes": 4, "mb_stitch": {"alpha": 1.0, "cem": {"population": 50}}},
     }
 
 
@@ -95,11 +99,20 @@ def train_run(run_dir: Path) -> Path:
 
 
 def finish_run(run_dir: Path) -> Path:
-    make_episodes().to_parquet(run_dir / "episodes.parquet")
     (run_dir / "report" / "figures").mkdir(parents=True)
     (run_dir / "report" / "index.html").write_text("<html></html>")
     (run_dir / "report" / "figures" / "scores.svg").write_text("<svg/>")
+    report(run_dir, make_episodes())
     return run_dir
+
+
+def report(run_dir: Path, episodes: pd.DataFrame) -> None:
+    """The result's files, written by what writes them in earnest."""
+    episodes.to_parquet(run_dir / "episodes.parquet")
+    spec = RunSpec.from_dict(make_spec())
+    table = build_table(episodes, spec, spec.tables[0])
+    (run_dir / "report" / "table1.csv").write_text(to_csv(table.scores))
+    (run_dir / "report" / "table1-gains.csv").write_text(to_csv(table.gains))
 
 
 @pytest.fixture
@@ -241,8 +254,8 @@ def test_a_failed_run(tmp_path: Path, uri: str) -> None:
 
 def test_long_configurations_fit_into_params(tmp_path: Path, uri: str) -> None:
     run_dir = start_run(tmp_path / "run")
-    spec = make_spec() | {"notes": "x" * 9000, "many": {str(i): i for i in range(150)}}
-    write_json(run_dir / "spec.json", spec)
+    long = {"notes": "x" * 9000, "many": {str(i): i for i in range(150)}}
+    write_json(run_dir / "spec.json", make_spec() | {"spec": long})
     assert publish(run_dir, uri, finished=False).ok
     params = Seen(uri).parent.data.params
     assert len(params["notes"]) == tracking.LONGEST_TEXT
@@ -284,8 +297,7 @@ def test_republishing_what_was_published_in_part_makes_no_duplicates(
 
 def test_changed_scores_replace_the_old_ones(run_dir: Path, uri: str) -> None:
     publish(run_dir, uri, finished=True)
-    worse = make_episodes().assign(accomplished=0, score=0.0)
-    worse.to_parquet(run_dir / "episodes.parquet")
+    report(run_dir, make_episodes().assign(accomplished=0, score=0.0))
     assert publish(run_dir, uri, finished=True).ok
     seen = Seen(uri)
     assert seen.parent.data.metrics["table1/2 goals/no-stitch/score"] == 0
@@ -298,7 +310,7 @@ def test_changed_scores_replace_the_old_ones(run_dir: Path, uri: str) -> None:
 
 def test_changed_params_make_a_new_run(run_dir: Path, uri: str) -> None:
     publish(run_dir, uri, finished=True)
-    write_json(run_dir / "spec.json", make_spec() | {"root_seed": 1, "episodes": 3})
+    write_json(run_dir / "spec.json", make_spec() | {"spec": {"episodes": 3}})
     assert publish(run_dir, uri, finished=True).ok
     seen = Seen(uri)
     assert seen.count == 1 + CHILDREN
@@ -325,7 +337,10 @@ def test_pending_until_published(run_dir: Path, uri: str, tmp_path: Path) -> Non
     publish(run_dir, uri, finished=True)
     assert not pending(run_dir, uri)
     assert pending(run_dir, default_uri(tmp_path / "elsewhere"))
-    (run_dir / "report" / "index.html").write_text("another report")
+    for dated in tracking.DATED:  # which alone are no news
+        (run_dir / dated).write_text((run_dir / dated).read_text() + " ")
+    assert not pending(run_dir, uri)
+    (run_dir / "report" / "figures" / "scores.svg").write_text("another figure")
     assert pending(run_dir, uri)
     publish(run_dir, uri, finished=True)
     Path(uri.removeprefix("sqlite:///")).unlink()
@@ -493,13 +508,14 @@ def test_runs_that_publish_to_one_new_store_at_the_same_time(tmp_path: Path) -> 
         assert Seen(uri, run_id=name).states() == ("FINISHED", {"FINISHED"})
 
 
-def test_a_killed_schema_creation_does_no_harm(tmp_path: Path) -> None:
-    (tmp_path / "mlflow.db.new").write_bytes(b"half a database")
-    code = (
-        f"from orchestrator.tracking import prepare; assert prepare({default_uri(tmp_path)!r}).ok"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)
-    assert (tmp_path / "mlflow.db").exists()
+def test_a_schema_that_a_background_thread_creates(run_dir: Path, tmp_path: Path) -> None:
+    (tmp_path / "mlflow.db.new").write_bytes(b"what a kill left of an earlier attempt")
+    uri = default_uri(tmp_path)
+    thread = threading.Thread(target=tracking.prepare, args=(uri,))
+    thread.start()
+    assert publish(run_dir, uri, finished=True).ok
+    thread.join()
+    assert Seen(uri).states() == ("FINISHED", {"FINISHED"})
     assert not (tmp_path / "mlflow.db.new").exists()
 
 

@@ -1,0 +1,42 @@
+# Everything from a clean clone: needs Python 3.11, nothing else. `make help` lists the targets.
+
+PYTHON ?= python3.11
+VENV := .venv
+BIN := $(VENV)/bin
+SOURCES := stitching orchestrator sweeps analysis tests
+
+.PHONY: help setup reproduce test lint bench browser constraints
+
+help:  ## list the targets
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
+
+setup: $(VENV)/.installed  ## make the virtual environment
+
+# torch goes first and alone: with it in place, nothing pulls another build of it.
+$(VENV)/.installed: pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet torch==2.13.0 --constraint constraints.txt
+	$(BIN)/pip install --quiet --editable '.[dev]' --constraint constraints.txt
+	touch $@
+
+reproduce: setup  ## Table 1 at full scale; resumes when run again
+	$(BIN)/skillstitch run table1 --scale paper --results results
+
+test: setup browser  ## all tests, the slow tail included
+	SKILLSTITCH_REQUIRE_BROWSER=1 $(BIN)/pytest -n 2 --dist worksteal
+
+lint: setup  ## style and types
+	$(BIN)/ruff check $(SOURCES)
+	$(BIN)/ruff format --check $(SOURCES)
+	$(BIN)/mypy
+
+bench: setup  ## ratios that the documentation quotes, each within one run
+	$(BIN)/python -m tests.bench
+
+# The report is tested in a real browser; Debian's is the one that needs no download of its own.
+browser:
+	@command -v chromium >/dev/null || (apt-get update -qq && apt-get install -y -qq --no-install-recommends chromium)
+
+constraints: setup
+	(echo "# Exact versions that this revision is tested with. Written by 'make constraints'."; \
+	 $(BIN)/pip freeze --exclude-editable | sed 's/+cpu$$//') > constraints.txt

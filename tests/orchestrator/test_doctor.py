@@ -1,0 +1,142 @@
+"""The doctor on this machine, and its judgement of machines that are worse."""
+
+import importlib.metadata
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from rich.console import Console
+
+from orchestrator import doctor
+from orchestrator.doctor import GIB, Finding, diagnose
+
+
+def by_name(findings: list[Finding]) -> dict[str, Finding]:
+    return {finding.name: finding for finding in findings}
+
+
+def test_this_machine_has_no_fault(tmp_path: Path) -> None:
+    findings = diagnose(tmp_path / "runs")
+    assert [finding for finding in findings if finding.status == "fault"] == []
+    assert not doctor.has_faults(findings)
+    names = by_name(findings)
+    assert {"Python", "torch", "numpy", "mujoco", "cores", "disk", "self test"} <= names.keys()
+    assert "pytest" not in names  # extras are nobody's duty
+    assert all(finding.advice for finding in findings if finding.status != "ok")
+    assert list((tmp_path / "runs").iterdir()) == []
+
+
+def test_a_root_that_cannot_be_written_to(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_text("in the way")
+    (finding,) = doctor.check_root(file)
+    assert finding.status == "fault"
+    assert str(file) in finding.found
+    assert "--out" in finding.advice
+    (finding,) = doctor.check_root(file / "below")
+    assert finding.status == "fault"
+
+
+@pytest.mark.parametrize(
+    ("pin", "version", "status"),
+    [
+        ("numpy<2", "1.26.4", "ok"),
+        ("numpy<2", "2.1.0", "fault"),
+        ("mujoco>=3.3,<3.10", "3.9.0", "ok"),
+        ("mujoco>=3.3,<3.10", "3.10.0", "fault"),
+        ("mujoco>=3.3,<3.10", "3.2.7", "fault"),
+        ("torch==2.13.0", "2.13.0+cpu", "ok"),
+        ("torch==2.13.0", "2.12.1", "fault"),
+        ("pandas", "3.0", "ok"),
+        ("pandas", None, "fault"),
+    ],
+)
+def test_packages_are_held_to_their_pins(pin: str, version: str | None, status: str) -> None:
+    finding = doctor.judge_package(Requirement(pin), version)
+    assert finding.status == status
+    assert finding.found == (version or "not installed")
+    assert bool(finding.advice) == (status != "ok")
+
+
+def test_advice_says_what_to_install_and_why() -> None:
+    advice = doctor.judge_package(Requirement("mujoco>=3.3,<3.10"), "3.17").advice
+    assert 'pip install "mujoco<3.10,>=3.3"' in advice
+    assert "break robosuite" in advice
+
+
+def test_a_source_tree_that_was_never_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def requires(name: str) -> None:
+        raise importlib.metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(importlib.metadata, "requires", requires)
+    (finding,) = doctor.check_packages()
+    assert finding.status == "fault"
+    assert "pip install -e ." in finding.advice
+
+
+@pytest.mark.parametrize(
+    ("finding", "status"),
+    [
+        (doctor.judge_python("3.11.9"), "ok"),
+        (doctor.judge_python("3.12.0"), "fault"),
+        (doctor.judge_cores(8, None), "ok"),
+        (doctor.judge_cores(8, "1"), "ok"),
+        (doctor.judge_cores(8, "8"), "warn"),
+        (doctor.judge_memory(64 * GIB), "ok"),
+        (doctor.judge_memory(4 * GIB), "warn"),
+        (doctor.judge_memory(1 * GIB), "fault"),
+        (doctor.judge_shared_memory(2 * GIB), "ok"),
+        (doctor.judge_shared_memory(64 * 2**20), "warn"),  # Docker's default
+        (doctor.judge_disk(100 * GIB), "ok"),
+        (doctor.judge_disk(5 * GIB), "warn"),
+        (doctor.judge_disk(GIB // 2), "fault"),
+        (doctor.judge_sqlite((3, 45, 1)), "ok"),
+        (doctor.judge_sqlite((3, 30, 9)), "fault"),
+        (doctor.judge_rendering(["EGL"]), "ok"),
+        (doctor.judge_rendering([]), "warn"),
+        (doctor.judge_determinism({"w": b"1"}, {"w": b"1"}, 0.5), "ok"),
+        (doctor.judge_determinism({"w": b"1"}, {"w": b"2"}, 0.5), "fault"),
+    ],
+)
+def test_judgements(finding: Finding, status: str) -> None:
+    assert finding.status == status
+    assert bool(finding.advice) == (status != "ok")
+
+
+def test_a_training_that_diverges_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+    def diverges() -> None:
+        raise FloatingPointError("training diverged: value_loss is nan at update 5")
+
+    monkeypatch.setattr(doctor, "train_tiny_agent", diverges)
+    finding = doctor.check_training()
+    assert finding.status == "fault"
+    assert "value_loss is nan" in finding.found
+
+
+def test_a_check_that_breaks_keeps_no_other_from_running(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def breaks() -> Finding:
+        raise OSError("libtorch is missing\nand more")
+
+    monkeypatch.setattr(doctor, "check_gpu", breaks)
+    monkeypatch.setattr(doctor, "check_training", breaks)
+    found = by_name(diagnose(tmp_path))
+    assert found["GPU"].status == "fault"
+    assert found["GPU"].found == "OSError: libtorch is missing"
+    assert found["disk"].status != "fault"
+
+
+def test_both_renderings_say_all() -> None:
+    findings = [
+        Finding("numpy", "fault", "2.1", 'run `pip install "x[dev]"`'),
+        Finding("disk", "ok", "9"),
+    ]
+    console = Console(width=100)
+    with console.capture() as capture:
+        console.print(doctor.as_table(findings))
+    assert '"x[dev]"' in capture.get()
+    assert doctor.as_lines(findings) == [
+        'fault  numpy: 2.1; run `pip install "x[dev]"`',
+        "ok     disk: 9",
+    ]

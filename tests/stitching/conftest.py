@@ -1,0 +1,83 @@
+"""A small maze with briefly trained models for the tests of playing; one thread, as in workers."""
+
+import pytest
+import torch
+from hypothesis import settings
+
+from stitching.data.experience import (
+    mixed_conditions,
+    mixed_experience,
+    skill_experience,
+    skill_pairs,
+)
+from stitching.data.maze import MazeDataConfig, exploration, skill_demonstrations
+from stitching.data.transitions import Transitions, concatenate
+from stitching.envs.maze import Maze
+from stitching.envs.protocol import conditions
+from stitching.models.agent import Agent
+from stitching.models.dynamics import Dynamics, DynamicsConfig, train_dynamics
+from stitching.models.iql import IQLConfig, train_iql
+from stitching.planning.random_shooting import RandomShooting
+from stitching.stitchers import MBStitch, MFStitch, NoStitch, RandomStitch, Stitcher
+
+torch.set_num_threads(1)
+
+settings.register_profile("repeatable", derandomize=True, deadline=None)
+settings.load_profile("repeatable")
+
+TRAINING = IQLConfig(updates=250, batch_size=64, members=3, width=32, learning_rate=3e-3, tau=0.05)
+DYNAMICS = DynamicsConfig(updates=250, batch_size=64, members=3, width=32, learning_rate=3e-3)
+
+
+@pytest.fixture(scope="session")
+def maze() -> Maze:
+    """Not the benchmark's own map: tests of playing must not depend on the choice of that."""
+    return Maze(
+        layout=("#######", "#.....#", "#.##..#", "#.....#", "#..#..#", "#..#..#", "#######"),
+        spawn=(5, 2),
+        goals=(("a", (1, 1)), ("b", (3, 3)), ("c", (1, 5)), ("d", (5, 5))),
+    )
+
+
+@pytest.fixture(scope="session")
+def demonstrations(maze: Maze) -> Transitions:
+    """Noisy enough that later skills often work, but not always."""
+    return skill_demonstrations(maze, MazeDataConfig(episodes=40, noise=0.3), seed=0)
+
+
+@pytest.fixture(scope="session")
+def agent(maze: Maze, demonstrations: Transitions) -> Agent:
+    experience = skill_experience(demonstrations, conditions(maze))
+    trained = train_iql(experience, maze.actions, TRAINING, "agent")
+    return Agent(trained.weights, conditions(maze), maze.actions)
+
+
+@pytest.fixture(scope="session")
+def mf_policy(maze: Maze, demonstrations: Transitions) -> Agent:
+    experience = mixed_experience(demonstrations, conditions(maze))
+    trained = train_iql(experience, maze.actions, TRAINING, "mf-policy")
+    return Agent(trained.weights, mixed_conditions(conditions(maze)), maze.actions)
+
+
+@pytest.fixture(scope="session")
+def dynamics(maze: Maze, demonstrations: Transitions) -> Dynamics:
+    explored = exploration(maze, MazeDataConfig(exploration_episodes=50), seed=0)
+    trained = train_dynamics(concatenate([demonstrations, explored]), DYNAMICS, "dynamics")
+    return Dynamics(trained.weights, DYNAMICS)
+
+
+@pytest.fixture(scope="session")
+def stitchers(
+    maze: Maze, agent: Agent, mf_policy: Agent, dynamics: Dynamics
+) -> dict[str, Stitcher]:
+    """The four methods, and MB-Stitch that plans anew after every action, by name."""
+    planner = RandomShooting(population=30, horizon=4)
+    planning = (agent, dynamics, planner, maze.actions, 1.0, 1.0, "mean")
+    pairs = {pair: row for row, pair in enumerate(skill_pairs(len(maze.skills)))}
+    return {
+        "no-stitch": NoStitch(),
+        "random-stitch": RandomStitch(maze.actions, limit=5),
+        "mf-stitch": MFStitch(mf_policy, pairs, maze.actions, limit=5),
+        "mb-stitch": MBStitch(*planning, execute=4, limit=5),
+        "mb-stitch[execute=1]": MBStitch(*planning, execute=1, limit=5),
+    }
