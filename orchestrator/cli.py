@@ -214,7 +214,7 @@ def _compare(words: list[str]) -> None:
 
 
 def _doctor(words: list[str]) -> None:
-    from orchestrator.doctor import diagnose, render
+    from orchestrator.doctor import as_lines, as_table, diagnose, has_faults
 
     def doctor(root: Path = Path("runs")) -> None:
         """Check this machine and the installation, with a one-second self test.
@@ -223,8 +223,12 @@ def _doctor(words: list[str]) -> None:
             root: where runs are to be kept.
         """
         findings = diagnose(root)
-        OUTPUT.print(render(findings))
-        if any(finding.status == "fault" for finding in findings):
+        if OUTPUT.is_terminal:
+            OUTPUT.print(as_table(findings))
+        else:
+            for line in as_lines(findings):
+                OUTPUT.print(line, markup=False, soft_wrap=True)
+        if has_faults(findings):
             sys.exit(1)
 
     tyro.cli(doctor, args=words, prog="skillstitch doctor")

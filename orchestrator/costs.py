@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Literal
 
+from orchestrator.jobs import BlockTask
 from orchestrator.ledger import Ledger
-from orchestrator.plan import Plan
+from orchestrator.plan import Node, Plan
 from orchestrator.recipes import Recipe
 from orchestrator.store import CorruptArtifactError, Store
 
@@ -22,13 +25,15 @@ REFERENCE_SECONDS = {
 REFERENCE_SECONDS_PER_SEGMENT = 0.005
 BYTES_PER_SEGMENT = 120
 
+Standing = Literal["found", "decided", "missing"]
+
 
 @dataclass(frozen=True)
 class Estimate:
     """What is there, what is missing, and what the missing will take at most."""
 
     artifacts: dict[str, tuple[int, int]]  # kind → found, missing
-    blocks: dict[str, tuple[int, int]]  # method ("" for first skills) → found, missing
+    blocks: dict[str, dict[Standing, int]]  # method ("" for first skills) → counts
     episodes: int  # of the finished tables: tasks × methods × seeds × episodes
     segments_in_tree: int
     segments_naive: int
@@ -52,15 +57,13 @@ def estimate(plan: Plan, store: Store, shared: Ledger) -> Estimate:
         if not found:
             training += history.get(_size_class(recipe), REFERENCE_SECONDS[recipe.kind])
 
-    finished = shared.finished()
     rates = shared.seconds_per_segment()
-    blocks: dict[str, Counter[bool]] = {}
+    blocks: dict[str, Counter[Standing]] = {}
     evaluation = 0.0
     missing_segments = 0
-    for (node, _), task in plan.tasks.items():
-        found = task.key in finished
-        blocks.setdefault(node.method, Counter())[found] += 1
-        if not found:
+    for node, task, standing in standings(plan, shared):
+        blocks.setdefault(node.method, Counter())[standing] += 1
+        if standing == "missing":
             segments = task.episodes[1] - task.episodes[0]
             missing_segments += segments
             evaluation += segments * rates.get(task.cost_name, REFERENCE_SECONDS_PER_SEGMENT)
@@ -70,7 +73,7 @@ def estimate(plan: Plan, store: Store, shared: Ledger) -> Estimate:
     naive_steps = sum(spec.step_limits[len(task)] for task in spec.all_tasks) * runs
     return Estimate(
         artifacts={kind: (c[True], c[False]) for kind, c in artifacts.items()},
-        blocks={method: (c[True], c[False]) for method, c in blocks.items()},
+        blocks={method: dict(counts) for method, counts in blocks.items()},
         episodes=len(spec.all_tasks) * runs,
         segments_in_tree=len(plan.nodes) * spec.episodes,
         segments_naive=naive_segments,
@@ -81,6 +84,26 @@ def estimate(plan: Plan, store: Store, shared: Ledger) -> Estimate:
         disk_bytes=2 * BYTES_PER_SEGMENT * missing_segments,
         from_history=bool(rates),
     )
+
+
+def standings(plan: Plan, shared: Ledger) -> Iterator[tuple[Node, BlockTask, Standing]]:
+    """Every block of a plan, and whether it is there, not needed, or to be played.
+
+    A block is decided without being played where no episode survived a block above it. What lies
+    below a missing block counts as missing: it is, at most.
+    """
+    for chunk in range(len(plan.chunks)):
+        waiting: list[tuple[Node, Standing | None]] = [(root, None) for root in plan.roots()]
+        while waiting:
+            node, standing = waiting.pop()
+            task = plan.tasks[node, chunk]
+            below = standing
+            if standing is None:
+                outcome = next((outcome for _, outcome in shared.outcomes([task.key])), None)
+                standing = "missing" if outcome is None else "found"
+                below = "missing" if outcome is None else None if outcome.survivors else "decided"
+            yield node, task, standing
+            waiting.extend((child, below) for child in plan.children.get(node, []))
 
 
 def _steps_in_tree(plan: Plan) -> int:

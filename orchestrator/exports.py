@@ -5,39 +5,44 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from orchestrator.driver import ATTEMPTS
+from orchestrator.jobs import ATTEMPTS
 from orchestrator.ledger import Ledger
-from orchestrator.plan import Plan
+from orchestrator.plan import Node, Plan
 from orchestrator.rundir import RunDirectory
 from orchestrator.store import Store
 from orchestrator.structure import Plain
 
-EPISODE_COLUMNS = (
-    "episode",
-    "success",
-    "stitch_steps",
-    "steps",
-    "end_step",
-    "value_start",
-    "value_end",
-)
+EPISODE_COLUMNS = {
+    "episode": np.int64,
+    "success": np.bool_,
+    "stitch_steps": np.int64,
+    "steps": np.int64,
+    "end_step": np.int64,
+    "value_start": np.float32,
+    "value_end": np.float32,
+}
 
 
 def segments_frame(plan: Plan, ledger: Ledger) -> pd.DataFrame:
     """One row per segment, in the plan's order, whoever played it and when."""
-    places = {task.key: (node, task) for (node, _), task in plan.tasks.items()}
-    frames = []
+    places = {task.key: node for (node, _), task in plan.tasks.items()}
+    nodes: list[Node] = []  # of each row
+    columns = {name: [np.empty(0, kind)] for name, kind in EPISODE_COLUMNS.items()}
     for key, outcome in ledger.outcomes(places):
-        node, _ = places[key]
-        frame = pd.DataFrame({name: outcome.arrays[name] for name in EPISODE_COLUMNS})
-        frame.insert(0, "depth", len(node.prefix))
-        frame.insert(0, "prefix", ">".join(node.prefix))
-        frame.insert(0, "method", node.method)
-        frame.insert(0, "seed", node.seed)
-        if len(node.prefix) == 1:
-            frame[["value_start", "value_end"]] = np.float32(np.nan)
-        frames.append(frame)
-    return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame()
+        nodes += [places[key]] * len(outcome.arrays["episode"])
+        for name, parts in columns.items():
+            parts.append(outcome.arrays[name])
+    frame = pd.DataFrame(
+        {
+            "seed": np.array([node.seed for node in nodes], dtype=np.int64),
+            "method": [node.method for node in nodes],
+            "prefix": [">".join(node.prefix) for node in nodes],
+            "depth": np.array([len(node.prefix) for node in nodes], dtype=np.int64),
+        }
+        | {name: np.concatenate(parts) for name, parts in columns.items()}
+    )
+    frame.loc[frame["depth"] == 1, ["value_start", "value_end"]] = np.float32(np.nan)
+    return frame
 
 
 def quarantine(plan: Plan, ledger: Ledger) -> list[Plain]:

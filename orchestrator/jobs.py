@@ -10,6 +10,8 @@ from orchestrator.recipes import Recipe
 from orchestrator.store import Artifact
 from orchestrator.structure import Plain
 
+ATTEMPTS = 3  # at one job, before it is given up
+
 
 @dataclass(frozen=True)
 class BuildJob:

@@ -13,6 +13,7 @@ import numpy as np
 from safetensors.numpy import load, save
 
 from orchestrator.errors import NondeterminismError, StorageError
+from orchestrator.store import storage_errors
 
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS blocks (
@@ -36,9 +37,14 @@ class Outcome:
 
     arrays: dict[str, np.ndarray]
 
+    @property
+    def survivors(self) -> int:
+        """Episodes that accomplished the skill and so go on."""
+        return int(self.arrays["success"].sum())
+
     def to_bytes(self) -> bytes:
         """The same arrays give the same bytes."""
-        return save({name: np.ascontiguousarray(array) for name, array in self.arrays.items()})
+        return save({name: np.asarray(array, order="C") for name, array in self.arrays.items()})
 
     @staticmethod
     def from_bytes(data: bytes) -> Outcome:
@@ -58,7 +64,8 @@ class Ledger:
             if read_only:
                 self._db = sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=30)
                 return
-            path.parent.mkdir(parents=True, exist_ok=True)
+            with storage_errors(path):
+                path.parent.mkdir(parents=True, exist_ok=True)
             self._db = sqlite3.connect(path, timeout=30, isolation_level=None)
             self._db.execute("PRAGMA journal_mode=WAL")
             self._db.execute("PRAGMA synchronous=FULL")
@@ -89,29 +96,29 @@ class Ledger:
                     )
 
     def finished(self) -> set[str]:
-        return {key for (key,) in self._db.execute("SELECT key FROM blocks")}
+        with self._storage_errors():
+            return {key for (key,) in self._db.execute("SELECT key FROM blocks")}
 
     def outcomes(self, keys: Iterable[str]) -> Iterator[tuple[str, Outcome]]:
         """Recorded outcomes in the order asked for; keys not recorded are skipped.
 
         Raises NondeterminismError when stored bytes no longer match their digest.
         """
+        return ((key, Outcome.from_bytes(data)) for key, data in self.raw(keys))
+
+    def raw(self, keys: Iterable[str]) -> Iterator[tuple[str, bytes]]:
+        """The same as bytes, as `record` takes them."""
         for key in keys:
-            row = self._db.execute(
-                "SELECT digest, outcome FROM blocks WHERE key = ?", (key,)
-            ).fetchone()
+            with self._storage_errors():
+                row = self._db.execute(
+                    "SELECT digest, outcome FROM blocks WHERE key = ?", (key,)
+                ).fetchone()
             if row is None:
                 continue
             digest, data = row
             if hashlib.sha256(data).hexdigest() != digest:
                 raise NondeterminismError(f"{self.path}: block {key} is damaged on disk")
-            yield key, Outcome.from_bytes(data)
-
-    def raw(self, keys: Iterable[str]) -> Iterator[tuple[str, bytes]]:
-        for key in keys:
-            row = self._db.execute("SELECT outcome FROM blocks WHERE key = ?", (key,)).fetchone()
-            if row is not None:
-                yield key, row[0]
+            yield key, data
 
     def record_artifact(self, key: str, digest: str) -> str:
         """Remember which bytes an artifact had when blocks were played; returns those on record."""
@@ -175,4 +182,9 @@ class Ledger:
                 self._db.execute("ROLLBACK")
             raise StorageError(
                 f"cannot write {self.path}: {error}; make room and run the same command again"
+            ) from error
+        except sqlite3.DatabaseError as error:
+            raise StorageError(
+                f"{self.path} is damaged: {error}; move it away and run the same command again "
+                "(run directory and store both keep the finished blocks)"
             ) from error

@@ -25,10 +25,12 @@ def plan_lines(spec: Spec, costs: Estimate, workers: int | None) -> Iterator[str
     yield "artifacts              found  missing"
     for kind, (found, missing) in costs.artifacts.items():
         yield f"  {kind:<20} {found:>5}  {missing:>7}"
-    yield "blocks                 found  missing"
-    for method, (found, missing) in costs.blocks.items():
+    yield "blocks                 found  missing  decided without playing"
+    for method in ("", *spec.methods):
         label = method_label(method) if method else "first skills (all)"
-        yield f"  {label:<20} {found:>5}  {missing:>7}"
+        counts = costs.blocks.get(method, {})
+        found, missing, decided = (counts.get(s, 0) for s in ("found", "missing", "decided"))
+        yield f"  {label:<20} {found:>5}  {missing:>7}  {decided:>7}"
     yield (
         f"segments: {costs.segments_in_tree:,} in the tree, {costs.segments_naive:,} without it "
         f"({costs.segments_naive / costs.segments_in_tree:.1f} × fewer), at most"
@@ -74,9 +76,10 @@ def summary_lines(directory: RunDirectory) -> Iterator[str]:
     for table in spec.tables:
         yield (directory.path / "report" / f"{table.id}.md").read_text().strip()
         yield ""
-    record = directory.read_json("provenance.json")
-    timings = ", ".join(f"{phase} {seconds:.0f} s" for phase, seconds in record["seconds"].items())
-    yield f"time: {timings}"
+    seconds = directory.read_json("seconds.json") or {}
+    phases = sorted(seconds.items(), key=lambda phase: -phase[1])
+    spent = ", ".join(f"{name} {duration:.0f} s" for name, duration in phases)
+    yield f"time: {sum(seconds.values()):.0f} s, of which {spent}"
     yield f"report: {directory.path / 'report' / 'index.html'}"
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from types import TracebackType
+from typing import Protocol
 
 from rich.console import Console
 from rich.progress import (
@@ -17,6 +18,26 @@ from rich.progress import (
 from rich.progress import Progress as RichBar
 
 SECONDS_BETWEEN_LINES = 10.0
+
+
+class Progress(Protocol):
+    """Is told how far the work is; draws it for a person."""
+
+    def phase(self, name: str, total: int, done: int) -> None: ...
+
+    def advance(self, count: int = 1) -> None: ...
+
+    def say(self, message: str) -> None: ...
+
+
+class Silent:
+    """Progress for tests and benchmarks."""
+
+    def phase(self, name: str, total: int, done: int) -> None: ...
+
+    def advance(self, count: int = 1) -> None: ...
+
+    def say(self, message: str) -> None: ...
 
 
 class ConsoleProgress:

@@ -10,14 +10,16 @@ from pathlib import Path
 from analysis.episodes import write_episodes
 from analysis.report import build_report
 from orchestrator import tracking
-from orchestrator.driver import Builds, Evaluation, Progress, verified_artifacts
+from orchestrator.building import Builds, verified_artifacts
 from orchestrator.errors import IncompleteError, SkillstitchError
+from orchestrator.evaluation import Evaluation
 from orchestrator.executors import ExecutorKind, open_executor
 from orchestrator.executors.protocol import Executor
 from orchestrator.exports import write_readable
 from orchestrator.jobs import Job, Report
 from orchestrator.ledger import Ledger
 from orchestrator.plan import make_plan
+from orchestrator.progress import Progress
 from orchestrator.provenance import provenance
 from orchestrator.rundir import RunDirectory
 from orchestrator.spec import Spec
@@ -82,17 +84,20 @@ def reproduce(spec: Spec, settings: Settings, progress: Progress) -> RunDirector
     Raises LockedError, ChangedError, BadDataError, StorageError; IncompleteError when blocks had
     to be given up (everything else is then finished and reported as partial).
     """
-    directory = RunDirectory(settings.out)
+    directory, watch = RunDirectory(settings.out), Stopwatch()
     with directory.locked():
         run_id = directory.settle(spec)
         uri = settings.resolved_tracking_uri()
         try:
-            _carry_out(spec, settings, directory, run_id, progress)
+            worked = _carry_out(spec, settings, directory, run_id, progress, watch)
         except SkillstitchError:
             publish(directory, uri, failed=True)
             raise
         if trouble := publish(directory, uri, finished=True):
             progress.say(f"tracking: {trouble}")
+        watch.lap("tracking")
+        if worked:
+            directory.write_json("seconds.json", watch.rounded())
         if given_up := directory.read_json("quarantine.json"):
             raise IncompleteError(
                 f"{len(given_up)} blocks were given up after repeated failures (see "
@@ -103,16 +108,20 @@ def reproduce(spec: Spec, settings: Settings, progress: Progress) -> RunDirector
 
 
 def _carry_out(
-    spec: Spec, settings: Settings, directory: RunDirectory, run_id: str, progress: Progress
-) -> None:
-    """Build and play whatever is missing, and write it up; nothing, if the run is complete."""
-    watch = Stopwatch()
+    spec: Spec,
+    settings: Settings,
+    directory: RunDirectory,
+    run_id: str,
+    progress: Progress,
+    watch: Stopwatch,
+) -> bool:
+    """Build and play whatever is missing, and write it up; False where nothing was missing."""
     plan = make_plan(spec)
     store, ledger = Store(settings.store), directory.ledger()
     shared = Ledger(settings.store / "blocks.sqlite")
     present = verified_artifacts(plan, store, ledger, progress)
     if directory.finished and present == set(plan.recipes):
-        return
+        return False
     directory.mark(finished=False)
     directory.write_json("provenance.json", provenance() | {"run_id": run_id})
     announcement = _announce(directory, settings.resolved_tracking_uri())
@@ -127,7 +136,8 @@ def _carry_out(
         watch.lap("evaluation")
     finally:
         executor.close()
-        announcement.join()
+    announcement.join()
+    watch.lap("stopping workers")
     first_phase = "training" if busy_training else "evaluation"
     watch.move(executor.seconds_to_open, first_phase, "starting workers")
     with storage_errors(directory.path):
@@ -135,7 +145,7 @@ def _carry_out(
         episodes = write_episodes(directory.path)
         counts["episodes"] = len(episodes)
         counts["environment steps without the tree"] = int(episodes["steps"].sum())
-        watch.lap("stopping workers and writing")
+        watch.lap("writing")
         directory.write_json(
             "provenance.json",
             provenance()
@@ -143,7 +153,7 @@ def _carry_out(
                 "run_id": run_id,
                 "executor": settings.executor,
                 "workers": executor.opened.workers if executor.opened else 0,
-                "seconds": {phase: round(s, 1) for phase, s in watch.seconds.items()},
+                "seconds": watch.rounded(),
                 "busy worker seconds": {
                     "training": round(busy_training, 1),
                     "evaluation": round(evaluation.seconds, 1),
@@ -153,6 +163,8 @@ def _carry_out(
         )
         build_report(directory.path)
     directory.mark(finished=True)
+    watch.lap("report")
+    return True
 
 
 def _announce(directory: RunDirectory, uri: str) -> threading.Thread:
@@ -160,7 +172,7 @@ def _announce(directory: RunDirectory, uri: str) -> threading.Thread:
 
     Its outcome does not matter: whatever is missed now, the last publication brings.
     """
-    thread = threading.Thread(target=publish, args=(directory, uri))
+    thread = threading.Thread(target=publish, args=(directory, uri), daemon=True)
     thread.start()
     return thread
 

@@ -30,6 +30,7 @@ class RunDirectory:
     provenance.json   where, when and with what it was made
     segments.parquet, episodes.parquet, training.json, datasets.json, showcase.json, report/
     quarantine.json   blocks that were given up
+    seconds.json      where the time of the last command that did any work went
     finished          there when all of the above is
     """
 
@@ -69,8 +70,10 @@ class RunDirectory:
                     f"{self.path} is in use by {holder or 'another process'}; "
                     "wait for it, or choose another --out"
                 ) from None
-            os.ftruncate(descriptor, 0)
-            os.pwrite(descriptor, f"process {os.getpid()} on {socket.gethostname()}".encode(), 0)
+            with storage_errors(self.path):
+                os.ftruncate(descriptor, 0)
+                holder = f"process {os.getpid()} on {socket.gethostname()}"
+                os.pwrite(descriptor, holder.encode(), 0)
             yield
         finally:
             os.close(descriptor)

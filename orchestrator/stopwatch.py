@@ -22,3 +22,7 @@ class Stopwatch:
         """Part of one phase was really another: a thing done lazily in the middle of it."""
         self.seconds[source] -= seconds
         self.seconds[target] = self.seconds.get(target, 0.0) + seconds
+
+    def rounded(self) -> dict[str, float]:
+        """Seconds by phase so far, to a tenth."""
+        return {phase: round(seconds, 1) for phase, seconds in self.seconds.items()}

@@ -10,12 +10,13 @@ import os
 import shutil
 import uuid
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.lib.format import read_array
 from safetensors import SafetensorError
 from safetensors.numpy import load as load_safetensors
 from safetensors.numpy import save as save_safetensors
@@ -50,7 +51,7 @@ class Artifact:
         info = {"info.json": json.dumps(self.info, sort_keys=True).encode()}
         if self.info.get("format") == "columns":
             return info | {f"{name}.npy": _npy(array) for name, array in self.arrays.items()}
-        arrays = {name: np.ascontiguousarray(array) for name, array in self.arrays.items()}
+        arrays = {name: np.asarray(array, order="C") for name, array in self.arrays.items()}
         return info | {"arrays.safetensors": save_safetensors(arrays)}
 
 
@@ -88,8 +89,7 @@ class Store:
                 text = json.dumps(manifest, sort_keys=True, indent=1)
                 write_durably(temporary / "manifest.json", text.encode())
                 final.parent.mkdir(parents=True, exist_ok=True)
-                shutil.rmtree(final, ignore_errors=True)
-                temporary.rename(final)
+                _replace_folder(temporary, final)
                 sync_folder(final.parent)
             finally:
                 shutil.rmtree(temporary, ignore_errors=True)
@@ -111,17 +111,16 @@ class Store:
             if hashlib.sha256(data).hexdigest() != expected:
                 raise CorruptArtifactError(f"{folder / name}: content does not match its digest")
             contents[name] = data
-        info = json.loads(contents.pop("info.json"))
-        return Artifact(_decode(contents, folder), info)
+        return _decode(contents, folder)
 
     def manifest(self, kind: str, key: str) -> dict[str, Any]:
         path = self.path(kind, key) / "manifest.json"
         try:
             manifest = json.loads(path.read_text())
-            if not {"digest", "files", "made"} <= manifest.keys():
-                raise CorruptArtifactError(f"{path}: incomplete")
-        except (OSError, ValueError, AttributeError) as error:
+        except (OSError, ValueError) as error:
             raise CorruptArtifactError(f"{path}: unreadable") from error
+        if not _is_manifest(manifest):
+            raise CorruptArtifactError(f"{path}: not a manifest of this store")
         return manifest
 
     def discard(self, kind: str, key: str) -> Path:
@@ -141,23 +140,55 @@ class Store:
 
 def _npy(array: np.ndarray) -> bytes:
     buffer = io.BytesIO()
-    np.save(buffer, np.ascontiguousarray(array), allow_pickle=False)
+    np.save(buffer, np.asarray(array, order="C"), allow_pickle=False)
     return buffer.getvalue()
 
 
-def _decode(contents: dict[str, bytes], folder: Path) -> Arrays:
-    """Arrays from checked bytes. Nothing is unpickled, whatever the files claim to be."""
+def _is_manifest(plain: Any) -> bool:
+    """Whether `write` can have written this; file names must not lead out of the folder."""
+    return (
+        isinstance(plain, dict)
+        and {"digest", "files", "made"} <= plain.keys()
+        and isinstance(plain["files"], dict)
+        and "info.json" in plain["files"]
+        and all(Path(name).name == name for name in plain["files"])
+    )
+
+
+def _decode(contents: dict[str, bytes], folder: Path) -> Artifact:
+    """An artifact from checked bytes. Nothing is unpickled, whatever the files claim to be."""
     try:
+        info = json.loads(contents.pop("info.json"))
         if "arrays.safetensors" in contents:
             # safetensors hands out read-only views of the buffer; torch wants to own its memory.
             loaded = load_safetensors(contents["arrays.safetensors"])
-            return {name: np.array(array) for name, array in loaded.items()}
-        return {
-            name.removesuffix(".npy"): np.load(io.BytesIO(data), allow_pickle=False)
+            return Artifact({name: np.array(array) for name, array in loaded.items()}, info)
+        arrays = {
+            # Not np.load, which takes archives and pickles for arrays, too.
+            name.removesuffix(".npy"): read_array(io.BytesIO(data), allow_pickle=False)
             for name, data in contents.items()
         }
     except (SafetensorError, ValueError) as error:
         raise CorruptArtifactError(f"{folder}: {error}") from error
+    return Artifact(arrays, info)
+
+
+def _replace_folder(source: Path, target: Path) -> None:
+    """Rename over a folder that may be there, or be put there by another writer meanwhile.
+
+    The old one is moved aside whole, so that no reader meets half of it.
+    """
+    while True:
+        try:
+            source.rename(target)
+            return
+        except OSError as error:
+            if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
+                raise
+        aside = source.with_name(f"{source.name}-{uuid.uuid4().hex}")
+        with suppress(FileNotFoundError):  # another writer has moved it aside
+            target.rename(aside)
+            shutil.rmtree(aside)
 
 
 def write_durably(path: Path, data: bytes) -> None:
@@ -190,14 +221,19 @@ def sync_folder(folder: Path) -> None:
         os.close(descriptor)
 
 
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+REFUSED = (errno.EROFS, errno.EACCES, errno.EPERM, errno.EEXIST, errno.ENOTDIR)
+
+
 @contextmanager
 def storage_errors(where: Path) -> Iterator[None]:
-    """Turn what a full or read-only disk raises into StorageError."""
+    """Turn what a full disk, or one that refuses to be written to, raises into StorageError."""
     try:
         yield
     except OSError as error:
-        if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EACCES):
-            raise StorageError(
-                f"cannot write {where}: {error.strerror}; make room and run the same command again"
-            ) from error
-        raise
+        if error.errno not in FULL + REFUSED:
+            raise
+        advice = "make room" if error.errno in FULL else "choose another place"
+        raise StorageError(
+            f"cannot write {where}: {error.strerror}; {advice} and run the same command again"
+        ) from error

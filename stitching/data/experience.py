@@ -32,9 +32,8 @@ def skill_experience(data: Transitions, conditions: np.ndarray) -> Experience:
     starts = data.episode_starts
     for episode in np.flatnonzero(data.episode_skills >= 0):
         rows = np.arange(starts[episode], data.episode_ends[episode])
-        achieved = np.zeros(len(rows), dtype=bool)
-        achieved[-1] = data.episode_successes[episode]
-        pieces.append((rows, np.full(len(rows), data.episode_skills[episode]), achieved))
+        succeeds = data.episode_successes[episode]
+        pieces.append(Piece(rows, data.episode_skills[episode], succeeds, ends=succeeds))
     return _gather(data, conditions, pieces)
 
 
@@ -43,7 +42,9 @@ def mixed_experience(data: Transitions, conditions: np.ndarray) -> Experience:
 
     For the pair (i, j): second halves of i's episodes, then first halves of j's. The paper leaves
     conditioning and reward open; ours: the policy is conditioned on both skills' vectors, and
-    reaching the middle of one of j's demonstrations earns 1 and ends the stitch.
+    reaching the middle of one of j's demonstrations earns 1 and ends the stitch. Where one of i's
+    demonstrations ends, the data end too: bootstrapping there, from a state from which no action
+    was ever seen, makes the values diverge.
     """
     episodes = [
         [rows for rows in data.episode_rows(skill) if len(rows) > 1]
@@ -51,12 +52,14 @@ def mixed_experience(data: Transitions, conditions: np.ndarray) -> Experience:
     ]
     pieces = []
     for pair, (previous, following) in enumerate(skill_pairs(len(conditions))):
-        halves = [(rows[len(rows) // 2 :], False) for rows in episodes[previous]]
-        halves += [(rows[: len(rows) // 2], True) for rows in episodes[following]]
-        for rows, reaches_middle in halves:
-            achieved = np.zeros(len(rows), dtype=bool)
-            achieved[-1] = reaches_middle
-            pieces.append((rows, np.full(len(rows), pair), achieved))
+        pieces += [
+            Piece(rows[len(rows) // 2 :], pair, earns=False, ends=True)
+            for rows in episodes[previous]
+        ]
+        pieces += [
+            Piece(rows[: len(rows) // 2], pair, earns=True, ends=True)
+            for rows in episodes[following]
+        ]
     return _gather(data, mixed_conditions(conditions), pieces)
 
 
@@ -71,14 +74,30 @@ def mixed_conditions(conditions: np.ndarray) -> np.ndarray:
     return np.array([np.concatenate([conditions[i], conditions[j]]) for i, j in pairs])
 
 
-def _gather(
-    data: Transitions,
-    conditions: np.ndarray,
-    pieces: list[tuple[np.ndarray, np.ndarray, np.ndarray]],
-) -> Experience:
+@dataclass(frozen=True)
+class Piece:
+    """Consecutive rows under one condition, and what their last transition means."""
+
+    rows: np.ndarray
+    condition_id: int
+    earns: bool  # reward 1 for the last transition
+    ends: bool  # nothing is bootstrapped beyond it
+
+
+def _gather(data: Transitions, conditions: np.ndarray, pieces: list[Piece]) -> Experience:
     if not pieces:
         raise DataError("the dataset demonstrates no skill: nothing to learn from")
-    rows, condition_ids, achieved = (np.concatenate(column) for column in zip(*pieces, strict=True))
+    lengths = [len(piece.rows) for piece in pieces]
+    last = np.cumsum(lengths) - 1
+    rewards = np.zeros(sum(lengths), dtype=np.float32)
+    rewards[last] = [piece.earns for piece in pieces]
+    terminals = np.zeros(sum(lengths), dtype=bool)
+    terminals[last] = [piece.ends for piece in pieces]
     return Experience(
-        data, rows, condition_ids, conditions, achieved.astype(np.float32), terminals=achieved
+        data,
+        np.concatenate([piece.rows for piece in pieces]),
+        np.repeat([piece.condition_id for piece in pieces], lengths),
+        conditions,
+        rewards,
+        terminals,
     )

@@ -19,21 +19,6 @@ class MazeDataConfig:
     exploration_steps: int = 20
 
 
-def distances(maze: Maze, goal: Cell) -> np.ndarray:
-    """Moves from each cell to the goal, (side, side) float64; inf in walls and out of reach."""
-    steps = np.full(maze.free.shape, np.inf)
-    steps[goal] = 0
-    frontier = [goal]
-    while frontier:
-        cell = frontier.pop(0)
-        for down, right in MOVES:
-            neighbour = (cell[0] + down, cell[1] + right)
-            if maze.free[neighbour] and np.isinf(steps[neighbour]):
-                steps[neighbour] = steps[cell] + 1
-                frontier.append(neighbour)
-    return steps
-
-
 def skill_demonstrations(maze: Maze, config: MazeDataConfig, seed: int) -> Transitions:
     """Spawn → goal for every goal: the first shortest move, with a random one now and then.
 
@@ -43,7 +28,7 @@ def skill_demonstrations(maze: Maze, config: MazeDataConfig, seed: int) -> Trans
     episodes = []
     for skill, (name, goal) in enumerate(maze.goals):
         rng = stream("demonstrations", maze.name, seed, name)
-        steps_left = distances(maze, goal)
+        steps_left = maze.distances(goal)
         for _ in range(config.episodes):
             cells, moves = [maze.spawn], []
             while cells[-1] != goal:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -69,41 +68,59 @@ def concatenate(parts: list[Transitions]) -> Transitions:
     return Transitions(**columns)
 
 
+KINDS = {
+    "observations": np.float32,
+    "actions": np.float32,
+    "next_observations": np.float32,
+    "episode_ends": np.int64,
+    "episode_skills": np.int64,
+    "episode_successes": np.bool_,
+}
+
+
 def check(data: Transitions, benchmark: Benchmark, source: str) -> None:
-    """Refuse data of the wrong shape or with values that are not finite, before any training.
+    """Refuse data of the wrong type or shape, or with impossible values, before any training.
 
     Raises DataError naming the column's file under `source` and the first bad row.
     """
-    observation, action = benchmark.observation_size, benchmark.actions.size
     rows, episodes = len(data.actions), len(data.episode_ends)
-    expected: Mapping[str, tuple[int, ...]] = {
-        "observations": (rows, observation),
-        "actions": (rows, action),
-        "next_observations": (rows, observation),
-        "episode_ends": (episodes,),
-        "episode_skills": (episodes,),
-        "episode_successes": (episodes,),
+    widths = {
+        "observations": (benchmark.observation_size,),
+        "actions": (benchmark.actions.size,),
+        "next_observations": (benchmark.observation_size,),
     }
     for name, column in data.columns().items():
-        file = f"{source}/{name}.npy"
-        if column.shape != expected[name]:
-            raise DataError(f"{file}: shape {column.shape}, expected {expected[name]}")
-        finite = np.isfinite(column).reshape(len(column), -1).all(axis=1)
-        if not finite.all():
-            raise DataError(f"{file}: row {int(np.argmin(finite))} is not finite")
-    if np.abs(data.actions).max(initial=0) > 1:
-        row = int(np.argmax(np.abs(data.actions).max(axis=1) > 1))
-        raise DataError(f"{source}/actions.npy: row {row} has an action outside [-1, 1]")
+        shape = (rows, *widths[name]) if name in widths else (episodes,)
+        if column.dtype != KINDS[name]:
+            kind = np.dtype(KINDS[name]).name
+            raise DataError(f"{source}/{name}.npy: type {column.dtype}, expected {kind}")
+        if column.shape != shape:
+            raise DataError(f"{source}/{name}.npy: shape {column.shape}, expected {shape}")
+    if not rows or not episodes:
+        raise DataError(f"{source}/episode_ends.npy: {episodes} episodes of {rows} transitions")
+
+    for name in widths:
+        finite = np.isfinite(getattr(data, name)).all(axis=1)
+        _refuse(~finite, f"{source}/{name}.npy", "is not finite")
+    outside = (np.abs(data.actions) > 1).any(axis=1)
+    _refuse(outside, f"{source}/actions.npy", "has an action outside [-1, 1]")
+    if benchmark.actions.discrete:
+        one_hot = ((data.actions == 0) | (data.actions == 1)).all(axis=1)
+        one_hot &= data.actions.sum(axis=1) == 1
+        _refuse(~one_hot, f"{source}/actions.npy", "is no one-hot action")
     lengths = np.diff(data.episode_ends, prepend=0)
-    if not episodes or (lengths <= 0).any() or data.episode_ends[-1] != rows:
-        row = int(np.argmax(lengths <= 0))
-        raise DataError(
-            f"{source}/episode_ends.npy: row {row}: ends must rise from above 0 to {rows}"
-        )
-    unknown = (data.episode_skills < NO_SKILL) | (data.episode_skills >= len(benchmark.skills))
+    wrong = (lengths <= 0) | (data.episode_ends > rows)
+    wrong[-1] |= data.episode_ends[-1] != rows
+    _refuse(wrong, f"{source}/episode_ends.npy", f"is wrong: ends must rise from above 0 to {rows}")
+    skills = len(benchmark.skills)
+    unknown = (data.episode_skills < NO_SKILL) | (data.episode_skills >= skills)
     if unknown.any():
-        row = int(np.argmax(unknown))
-        raise DataError(
-            f"{source}/episode_skills.npy: row {row} names skill {data.episode_skills[row]}, "
-            f"{benchmark.name} has {len(benchmark.skills)}"
-        )
+        stray = data.episode_skills[np.argmax(unknown)]
+        complaint = f"names skill {stray}, {benchmark.name} has {skills}"
+        _refuse(unknown, f"{source}/episode_skills.npy", complaint)
+
+
+def _refuse(bad: np.ndarray, file: str, complaint: str) -> None:
+    """DataError at the first row of a mask, if it has any."""
+    if bad.any():
+        raise DataError(f"{file}: row {int(np.argmax(bad))} {complaint}")

@@ -6,6 +6,7 @@ were chosen.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -37,6 +38,13 @@ class Maze:
         for name, cell in (("spawn", self.spawn), *self.goals):
             if self.layout[cell[0]][cell[1]] != ".":
                 raise ValueError(f"{name} lies in a wall of the maze: row {cell[0]}, {cell[1]}")
+        inside = np.zeros_like(self.free)
+        inside[1:-1, 1:-1] = True
+        if (self.free & ~inside).any():
+            raise ValueError("the maze's border must be a wall all round")
+        for name, goal in self.goals:
+            if np.isinf(self.distances(goal)[self.spawn]):
+                raise ValueError(f"no path leads from the spawn to {name}")
 
     @cached_property
     def skills(self) -> tuple[Skill, ...]:
@@ -67,6 +75,20 @@ class Maze:
             clear = [self._clear_cells(row, col, direction) for direction in WALL_DIRECTIONS]
             table[row, col] = np.array([row, col, *clear]) / side
         return table
+
+    def distances(self, goal: Cell) -> np.ndarray:
+        """Moves from each cell to the goal, (side, side) float64; inf in walls and out of reach."""
+        steps = np.full(self.free.shape, np.inf)
+        steps[goal] = 0
+        frontier = deque([goal])
+        while frontier:
+            row, col = frontier.popleft()
+            for down, right in MOVES:
+                neighbour = (row + down, col + right)
+                if self.free[neighbour] and np.isinf(steps[neighbour]):
+                    steps[neighbour] = steps[row, col] + 1
+                    frontier.append(neighbour)
+        return steps
 
     def _clear_cells(self, row: int, col: int, direction: Cell) -> int:
         count = 0

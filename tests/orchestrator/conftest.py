@@ -1,46 +1,17 @@
 """One finished tiny run a session, and copies of it to damage."""
 
 import shutil
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from tiny import Lines, carry_out, tiny_spec
 
-from orchestrator.ledger import Ledger
+from orchestrator import reproduce as reproducing
+from orchestrator.executors import open_executor
+from orchestrator.executors.protocol import Executor
 from orchestrator.plan import Plan, make_plan
-from orchestrator.rundir import RunDirectory
 from orchestrator.spec import Spec
-from orchestrator.store import Store
-
-
-@dataclass(frozen=True)
-class Place:
-    """A run directory and the store beside it."""
-
-    root: Path
-
-    @property
-    def out(self) -> Path:
-        return self.root / "run"
-
-    @property
-    def store_root(self) -> Path:
-        return self.root / "store"
-
-    @property
-    def store(self) -> Store:
-        return Store(self.store_root)
-
-    @property
-    def directory(self) -> RunDirectory:
-        return RunDirectory(self.out)
-
-    def shared(self) -> Ledger:
-        return Ledger(self.store_root / "blocks.sqlite")
-
-    def carry_out(self, spec: Spec, progress: Lines | None = None) -> RunDirectory:
-        return carry_out(spec, self.out, self.store_root, progress)
+from tests.orchestrator.tiny import Counted, Place, promised_bytes, tiny_spec
 
 
 @pytest.fixture(scope="session")
@@ -82,3 +53,24 @@ def trained(finished: Place, tmp_path: Path) -> Place:
         finished.store_root, place.store_root, ignore=shutil.ignore_patterns("blocks.sqlite*")
     )
     return place
+
+
+@pytest.fixture(scope="session")
+def ray_of_two() -> Iterator[Executor]:
+    """Ray on two cores; executors opened meanwhile join it, up to the workers they ask for."""
+    executor = open_executor("ray", 2, None)
+    yield executor
+    executor.close()
+
+
+@pytest.fixture
+def expected(finished: Place) -> dict[str, bytes]:
+    return promised_bytes(finished.out)
+
+
+@pytest.fixture
+def counted(monkeypatch: pytest.MonkeyPatch) -> Counted:
+    """The executor of every reproduction of this test."""
+    executor = Counted()
+    monkeypatch.setattr(reproducing, "open_executor", lambda *_: executor)
+    return executor

@@ -7,8 +7,18 @@ import pytest
 from packaging.requirements import Requirement
 from rich.console import Console
 
-from orchestrator import doctor
-from orchestrator.doctor import GIB, Finding, diagnose
+from orchestrator.doctor import (
+    Finding,
+    as_lines,
+    as_table,
+    diagnose,
+    has_faults,
+    machine,
+    packages,
+    selftest,
+    storage,
+)
+from orchestrator.doctor.finding import GIB
 
 
 def by_name(findings: list[Finding]) -> dict[str, Finding]:
@@ -18,7 +28,7 @@ def by_name(findings: list[Finding]) -> dict[str, Finding]:
 def test_this_machine_has_no_fault(tmp_path: Path) -> None:
     findings = diagnose(tmp_path / "runs")
     assert [finding for finding in findings if finding.status == "fault"] == []
-    assert not doctor.has_faults(findings)
+    assert not has_faults(findings)
     names = by_name(findings)
     assert {"Python", "torch", "numpy", "mujoco", "cores", "disk", "self test"} <= names.keys()
     assert "pytest" not in names  # extras are nobody's duty
@@ -29,11 +39,11 @@ def test_this_machine_has_no_fault(tmp_path: Path) -> None:
 def test_a_root_that_cannot_be_written_to(tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.write_text("in the way")
-    (finding,) = doctor.check_root(file)
+    (finding,) = storage.check_root(file)
     assert finding.status == "fault"
     assert str(file) in finding.found
     assert "--out" in finding.advice
-    (finding,) = doctor.check_root(file / "below")
+    (finding,) = storage.check_root(file / "below")
     assert finding.status == "fault"
 
 
@@ -52,14 +62,14 @@ def test_a_root_that_cannot_be_written_to(tmp_path: Path) -> None:
     ],
 )
 def test_packages_are_held_to_their_pins(pin: str, version: str | None, status: str) -> None:
-    finding = doctor.judge_package(Requirement(pin), version)
+    finding = packages.judge_package(Requirement(pin), version)
     assert finding.status == status
     assert finding.found == (version or "not installed")
     assert bool(finding.advice) == (status != "ok")
 
 
 def test_advice_says_what_to_install_and_why() -> None:
-    advice = doctor.judge_package(Requirement("mujoco>=3.3,<3.10"), "3.17").advice
+    advice = packages.judge_package(Requirement("mujoco>=3.3,<3.10"), "3.17").advice
     assert 'pip install "mujoco<3.10,>=3.3"' in advice
     assert "break robosuite" in advice
 
@@ -69,7 +79,7 @@ def test_a_source_tree_that_was_never_installed(monkeypatch: pytest.MonkeyPatch)
         raise importlib.metadata.PackageNotFoundError(name)
 
     monkeypatch.setattr(importlib.metadata, "requires", requires)
-    (finding,) = doctor.check_packages()
+    (finding,) = packages.check_packages()
     assert finding.status == "fault"
     assert "pip install -e ." in finding.advice
 
@@ -77,25 +87,25 @@ def test_a_source_tree_that_was_never_installed(monkeypatch: pytest.MonkeyPatch)
 @pytest.mark.parametrize(
     ("finding", "status"),
     [
-        (doctor.judge_python("3.11.9"), "ok"),
-        (doctor.judge_python("3.12.0"), "fault"),
-        (doctor.judge_cores(8, None), "ok"),
-        (doctor.judge_cores(8, "1"), "ok"),
-        (doctor.judge_cores(8, "8"), "warn"),
-        (doctor.judge_memory(64 * GIB), "ok"),
-        (doctor.judge_memory(4 * GIB), "warn"),
-        (doctor.judge_memory(1 * GIB), "fault"),
-        (doctor.judge_shared_memory(2 * GIB), "ok"),
-        (doctor.judge_shared_memory(64 * 2**20), "warn"),  # Docker's default
-        (doctor.judge_disk(100 * GIB), "ok"),
-        (doctor.judge_disk(5 * GIB), "warn"),
-        (doctor.judge_disk(GIB // 2), "fault"),
-        (doctor.judge_sqlite((3, 45, 1)), "ok"),
-        (doctor.judge_sqlite((3, 30, 9)), "fault"),
-        (doctor.judge_rendering(["EGL"]), "ok"),
-        (doctor.judge_rendering([]), "warn"),
-        (doctor.judge_determinism({"w": b"1"}, {"w": b"1"}, 0.5), "ok"),
-        (doctor.judge_determinism({"w": b"1"}, {"w": b"2"}, 0.5), "fault"),
+        (packages.judge_python("3.11.9"), "ok"),
+        (packages.judge_python("3.12.0"), "fault"),
+        (machine.judge_cores(8, None), "ok"),
+        (machine.judge_cores(8, "1"), "ok"),
+        (machine.judge_cores(8, "8"), "warn"),
+        (machine.judge_memory(64 * GIB), "ok"),
+        (machine.judge_memory(4 * GIB), "warn"),
+        (machine.judge_memory(1 * GIB), "fault"),
+        (machine.judge_shared_memory(2 * GIB), "ok"),
+        (machine.judge_shared_memory(64 * 2**20), "warn"),  # Docker's default
+        (storage.judge_disk(100 * GIB), "ok"),
+        (storage.judge_disk(5 * GIB), "warn"),
+        (storage.judge_disk(GIB // 2), "fault"),
+        (packages.judge_sqlite((3, 45, 1)), "ok"),
+        (packages.judge_sqlite((3, 30, 9)), "fault"),
+        (machine.judge_rendering(["EGL"]), "ok"),
+        (machine.judge_rendering([]), "warn"),
+        (selftest.judge_determinism({"w": b"1"}, {"w": b"1"}, 0.5), "ok"),
+        (selftest.judge_determinism({"w": b"1"}, {"w": b"2"}, 0.5), "fault"),
     ],
 )
 def test_judgements(finding: Finding, status: str) -> None:
@@ -107,8 +117,8 @@ def test_a_training_that_diverges_is_a_fault(monkeypatch: pytest.MonkeyPatch) ->
     def diverges() -> None:
         raise FloatingPointError("training diverged: value_loss is nan at update 5")
 
-    monkeypatch.setattr(doctor, "train_tiny_agent", diverges)
-    finding = doctor.check_training()
+    monkeypatch.setattr(selftest, "train_tiny_agent", diverges)
+    finding = selftest.check_training()
     assert finding.status == "fault"
     assert "value_loss is nan" in finding.found
 
@@ -119,8 +129,8 @@ def test_a_check_that_breaks_keeps_no_other_from_running(
     def breaks() -> Finding:
         raise OSError("libtorch is missing\nand more")
 
-    monkeypatch.setattr(doctor, "check_gpu", breaks)
-    monkeypatch.setattr(doctor, "check_training", breaks)
+    monkeypatch.setattr(machine, "check_gpu", breaks)
+    monkeypatch.setattr(selftest, "check_training", breaks)
     found = by_name(diagnose(tmp_path))
     assert found["GPU"].status == "fault"
     assert found["GPU"].found == "OSError: libtorch is missing"
@@ -134,9 +144,9 @@ def test_both_renderings_say_all() -> None:
     ]
     console = Console(width=100)
     with console.capture() as capture:
-        console.print(doctor.as_table(findings))
+        console.print(as_table(findings))
     assert '"x[dev]"' in capture.get()
-    assert doctor.as_lines(findings) == [
+    assert as_lines(findings) == [
         'fault  numpy: 2.1; run `pip install "x[dev]"`',
         "ok     disk: 9",
     ]

@@ -1,36 +1,33 @@
 """The same bytes, however the work is divided, ordered, shared or stripped of its tree."""
 
-import shutil
-from collections.abc import Iterator
-from dataclasses import replace
-from pathlib import Path
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 import pytest
-from conftest import Place
-from tiny import Lines, promised_bytes
 
 from orchestrator import reproduce as reproducing
 from orchestrator.builders import load_models
-from orchestrator.driver import Silent
-from orchestrator.executors import open_executor
 from orchestrator.executors.protocol import Executor
 from orchestrator.executors.serial import SerialExecutor
 from orchestrator.jobs import Report
+from orchestrator.ledger import Outcome
 from orchestrator.methods import make_stitcher, method_name
-from orchestrator.plan import Node, make_plan
-from orchestrator.reproduce import Settings, reproduce
+from orchestrator.plan import Node, Plan, make_plan
+from orchestrator.reproduce import Settings
 from orchestrator.spec import Spec
 from orchestrator.structure import to_plain
 from stitching.envs.registry import BENCHMARKS
-from stitching.rollout import Play, play_from_start
+from stitching.rollout import Play, Segments, play_from_start
+from tests.orchestrator.tiny import Lines, Place, carry_out, promised_bytes, serially
+
+METHODS = ("no-stitch", "random-stitch", "mf-stitch", "mb-stitch")
 
 
 @pytest.fixture(scope="module")
 def deep(spec: Spec) -> Spec:
     """Three skills deep, so that stitched segments have stitched parents."""
-    return replace(spec, lengths=(2, 3))
+    return replace(spec, lengths=(2, 3), tasks=())
 
 
 @pytest.fixture(scope="module")
@@ -55,10 +52,11 @@ def test_the_problem_is_worth_comparing(serial: Place, deep: Spec) -> None:
     """Every method has episodes that pass and episodes that fail beyond the first skill."""
     segments = pd.read_parquet(serial.out / "segments.parquet")
     later = segments[segments["depth"] > 1]
-    rates = later.groupby("method")["success"].mean()
-    assert set(rates.index) == set(deep.methods)
-    assert rates.between(0.01, 0.99).all()
-    assert (later[later["method"] != "no-stitch"]["stitch_steps"] > 0).any()
+    assert set(later["method"]) == set(deep.methods) == set(METHODS)
+    assert later.groupby("method")["success"].mean().between(0.01, 0.99).all()
+    stitches = later.groupby("method")["stitch_steps"].sum()
+    assert (stitches.drop("no-stitch") > 0).all()
+    assert stitches["no-stitch"] == 0
     assert (segments["depth"] == 3).any()
 
 
@@ -76,44 +74,31 @@ class Scrambled(SerialExecutor):
         return super().next()
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_any_order_of_arrival_gives_the_same_bytes(
+def test_any_order_of_arrival(
     deep: Spec,
     serial: Place,
     expected: dict[str, bytes],
     place: Place,
     monkeypatch: pytest.MonkeyPatch,
-    seed: int,
 ) -> None:
-    monkeypatch.setattr(reproducing, "open_executor", lambda *_: Scrambled(seed))
+    monkeypatch.setattr(reproducing, "open_executor", lambda *_: Scrambled(seed=0))
     place.carry_out(deep)
     assert promised_bytes(place.out) == expected
     assert artifact_digests(place) == artifact_digests(serial)
 
 
-def test_blocks_shared_with_a_smaller_run_give_the_same_bytes(
+def test_blocks_taken_over_from_a_smaller_run(
     deep: Spec, expected: dict[str, bytes], done: Place
 ) -> None:
-    """`done` has played the pairs alone; the triples build on its blocks."""
-    lines = Lines()
-    out = done.root / "deep"
-    settings = Settings(out, done.store_root, executor="serial", tracking_uri="none")
-    reproduce(replace(deep, step_limits={2: 20, 3: 30}), settings, lines)
+    out, lines = done.root / "deep", Lines()
+    carry_out(deep, serially(out, done.store_root), lines)
+    assert lines.phases["training"] == (9, 8)  # all but the showcase, which shows a longer task
     assert promised_bytes(out) == expected
-    assert lines.phases["training"][1] > 0
-
-
-@pytest.fixture(scope="module")
-def ray_of_two() -> Iterator[Executor]:
-    """Ray on two cores; executors opened meanwhile join it, up to the workers they ask for."""
-    executor = open_executor("ray", 2, None)
-    yield executor
-    executor.close()
 
 
 @pytest.mark.ray
 @pytest.mark.parametrize("workers", [1, 2])
-def test_ray_gives_the_same_bytes(
+def test_ray(
     deep: Spec,
     serial: Place,
     expected: dict[str, bytes],
@@ -124,73 +109,112 @@ def test_ray_gives_the_same_bytes(
     settings = Settings(
         place.out, place.store_root, executor="ray", workers=workers, tracking_uri="none"
     )
-    directory = reproduce(deep, settings, Silent())
+    directory = carry_out(deep, settings)
     assert directory.read_json("provenance.json")["workers"] == workers
     assert promised_bytes(place.out) == expected
     assert artifact_digests(place) == artifact_digests(serial)
 
 
-TASKS = ("g0>g1", "g1>g3", "g2>g1", "g0>g1>g3", "g3>g2>g1", "g1>g0>g2")
+@dataclass(frozen=True)
+class Alone:
+    """A task of one seed and method, to be played from its start by a fixed group of episodes."""
+
+    plan: Plan
+    place: Place
+    seed: int
+    method: str
+    task: tuple[str, ...]
+    chunk: int
+
+    def play(self, step_limit: int) -> list[Segments]:
+        spec = self.plan.spec
+        benchmark = BENCHMARKS[spec.benchmark]
+        task = self.plan.tasks[Node(self.seed, self.method, self.task), self.chunk]
+        artifacts = {kind: self.place.store.read(kind, key) for kind, key in task.artifacts.items()}
+        models = load_models(benchmark, task.configs, artifacts)
+        settings = to_plain(spec.method_config(self.method))
+        return play_from_start(
+            benchmark.block(),
+            models["agent"],
+            make_stitcher(self.method, settings, benchmark, models["agent"], models),
+            benchmark,
+            spec.rollout,
+            Play(
+                spec.root_seed,
+                spec.benchmark,
+                self.seed,
+                method_name(self.method),
+                tuple(range(*self.plan.chunks[self.chunk])),
+                self.task,
+            ),
+            step_limit,
+        )
+
+    def recorded(self) -> list[Outcome]:
+        """What the tree has for the same, one outcome a skill while any episode survives."""
+        nodes = [
+            Node(self.seed, self.method if depth > 1 else "", self.task[:depth])
+            for depth in range(1, len(self.task) + 1)
+        ]
+        ledger = self.place.directory.ledger(read_only=True)
+        keys = [self.plan.tasks[node, self.chunk].key for node in nodes]
+        outcomes = [outcome for _, outcome in ledger.outcomes(keys)]
+        ledger.close()
+        return outcomes
+
+
+def sample(spec: Spec, place: Place, seed: int, method: str) -> list[Alone]:
+    """Some tasks of each length, every chunk of their episodes."""
+    plan = make_plan(spec)
+    rng = np.random.default_rng(seed)
+    chosen = [spec.all_tasks[i] for i in rng.choice(len(spec.all_tasks), size=12, replace=False)]
+    return [
+        Alone(plan, place, seed, method, task, chunk)
+        for task in chosen
+        for chunk in range(len(plan.chunks))
+    ]
+
+
+COLUMNS = ("success", "stitch_steps", "steps", "value_start", "value_end")
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-@pytest.mark.parametrize("method", ["no-stitch", "random-stitch", "mf-stitch", "mb-stitch"])
-def test_tasks_played_from_the_start_without_the_tree(
+@pytest.mark.parametrize("method", METHODS)
+def test_tasks_played_without_the_tree(deep: Spec, serial: Place, method: str, seed: int) -> None:
+    stitched = 0
+    for alone in sample(deep, serial, seed, method):
+        recorded, played = alone.recorded(), alone.play(deep.step_limit)
+        assert len(played) == len(recorded)
+        for segments, outcome in zip(played, recorded, strict=True):
+            for name in COLUMNS:
+                ours, theirs = outcome.arrays[name], getattr(segments, name)
+                assert ours.dtype == theirs.dtype
+                assert ours.tobytes() == theirs.tobytes(), (alone.task, name)
+            reached = segments.snapshots[segments.success]
+            assert outcome.arrays["snapshots"].tobytes() == reached.tobytes()
+        stitched += len(played) > 1
+    assert stitched
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("method", METHODS)
+def test_a_shorter_limit_is_read_off_the_tree(
     deep: Spec, serial: Place, method: str, seed: int
 ) -> None:
-    """Step by step what the ledger holds, and, cut at its own limit, what the episodes say."""
-    plan = make_plan(deep)
-    benchmark = BENCHMARKS[deep.benchmark]
+    """Tasks of two skills may take 20 steps, the tree is played to 30: cutting must be exact."""
     episodes = pd.read_parquet(serial.out / "episodes.parquet")
-    ledger = serial.directory.ledger(read_only=True)
-    played_beyond_the_first = 0
-    for text in TASKS:
-        task = tuple(text.split(">"))
-        for chunk, (first, end) in enumerate(plan.chunks):
-            block_task = plan.tasks[Node(seed, method, task[:2]), chunk]
-            models = load_models(
-                benchmark,
-                block_task.configs,
-                {k: serial.store.read(k, key) for k, key in block_task.artifacts.items()},
-            )
-            stitcher = make_stitcher(
-                method,
-                to_plain(deep.method_config(method)),
-                benchmark,
-                models["agent"],
-                models,
-            )
-            play = Play(
-                deep.root_seed,
-                deep.benchmark,
-                seed,
-                method_name(method),
-                tuple(range(first, end)),
-                task,
-            )
-
-            def from_start(limit: int, play: Play = play, *with_models: object) -> list:
-                agent, stitcher = with_models
-                return play_from_start(
-                    benchmark.block(), agent, stitcher, benchmark, deep.rollout, play, limit
-                )
-
-            segments = from_start(deep.step_limit, play, models["agent"], stitcher)
-            used = np.zeros(end - first, dtype=np.int64)
-            for depth, segment in enumerate(segments, start=1):
-                node = Node(seed, method if depth > 1 else "", task[:depth])
-                key = plan.tasks[node, chunk].key
-                ((_, outcome),) = ledger.outcomes([key])
-                arrays = outcome.arrays
-                for name in ("success", "stitch_steps", "steps", "value_start", "value_end"):
-                    assert arrays[name].tobytes() == getattr(segment, name).tobytes(), (text, name)
-                    assert arrays[name].dtype == getattr(segment, name).dtype
-                reached = segment.snapshots[segment.success]
-                assert arrays["snapshots"].tobytes() == reached.tobytes()
-                assert (arrays["end_step"] == used + segment.steps).all()
-                used = (used + segment.steps)[segment.success]
-                played_beyond_the_first += depth > 1 and len(segment.steps)
-    ledger.close()
-    assert played_beyond_the_first
-    assert len(episodes)
-    shutil.rmtree(Path("/nonexistent"), ignore_errors=True)
+    episodes = episodes.set_index(["seed", "method", "task", "episode"])
+    cut = 0
+    for alone in sample(deep, serial, seed, method):
+        limit = deep.step_limits[len(alone.task)]
+        alive = np.arange(*alone.plan.chunks[alone.chunk])
+        accomplished = dict.fromkeys(alive.tolist(), 0)
+        for segments in alone.play(limit):
+            alive = alive[segments.success]
+            for episode in alive.tolist():
+                accomplished[episode] += 1
+        for episode, count in accomplished.items():
+            row = episodes.loc[(seed, method, ">".join(alone.task), episode)]
+            assert row["accomplished"] == count
+            cut += bool(row["steps"] == limit < deep.step_limit)
+    assert cut

@@ -1,16 +1,20 @@
 """What the orchestrator's tests share: a tiny reproduction, and its promised bytes."""
 
-from collections.abc import Callable
+from collections import Counter
+from dataclasses import dataclass
 from pathlib import Path
+from unittest import mock
 
-from orchestrator.driver import Silent
+from orchestrator.executors.serial import SerialExecutor
+from orchestrator.jobs import BuildJob, Job
+from orchestrator.ledger import Ledger
+from orchestrator.progress import Silent
 from orchestrator.reproduce import Settings, reproduce
 from orchestrator.rundir import RunDirectory
 from orchestrator.spec import Spec, load_spec
+from orchestrator.store import Store
 
 TINY = Path(__file__).with_name("tiny.toml")
-
-Reproduce = Callable[..., RunDirectory]
 
 
 def tiny_spec() -> Spec:
@@ -22,7 +26,7 @@ class Lines(Silent):
 
     def __init__(self) -> None:
         self.lines: list[str] = []
-        self.phases: dict[str, tuple[int, int]] = {}
+        self.phases: dict[str, tuple[int, int]] = {}  # name → total, already done
 
     def phase(self, name: str, total: int, done: int) -> None:
         self.phases[name] = total, done
@@ -35,10 +39,14 @@ class Lines(Silent):
         return "\n".join(self.lines)
 
 
-def carry_out(spec: Spec, out: Path, store: Path, progress: Silent | None = None) -> RunDirectory:
-    """A whole reproduction in this process, without tracking."""
-    settings = Settings(out, store, executor="serial", tracking_uri="none")
-    return reproduce(spec, settings, progress or Silent())
+def carry_out(spec: Spec, settings: Settings, progress: Silent | None = None) -> RunDirectory:
+    """A whole reproduction; without figures, which would be most of its time."""
+    with mock.patch("analysis.report.draw_figures", return_value=[]):
+        return reproduce(spec, settings, progress or Silent())
+
+
+def serially(out: Path, store: Path) -> Settings:
+    return Settings(out, store, executor="serial", tracking_uri="none")
 
 
 def promised_bytes(run: Path) -> dict[str, bytes]:
@@ -47,3 +55,55 @@ def promised_bytes(run: Path) -> dict[str, bytes]:
     assert len(tables) >= 4
     files = [run / "episodes.parquet", run / "segments.parquet", *tables]
     return {str(file.relative_to(run)): file.read_bytes() for file in files}
+
+
+@dataclass(frozen=True)
+class Place:
+    """A run directory and the store beside it."""
+
+    root: Path
+
+    @property
+    def out(self) -> Path:
+        return self.root / "run"
+
+    @property
+    def store_root(self) -> Path:
+        return self.root / "store"
+
+    @property
+    def store(self) -> Store:
+        return Store(self.store_root)
+
+    @property
+    def directory(self) -> RunDirectory:
+        return RunDirectory(self.out)
+
+    def shared(self) -> Ledger:
+        return Ledger(self.store_root / "blocks.sqlite")
+
+    def finished_blocks(self) -> set[str]:
+        ledger = self.directory.ledger(read_only=True)
+        try:
+            return ledger.finished()
+        finally:
+            ledger.close()
+
+    def carry_out(self, spec: Spec, progress: Silent | None = None) -> RunDirectory:
+        return carry_out(spec, serially(self.out, self.store_root), progress)
+
+
+class Counted(SerialExecutor):
+    """Remembers what it was asked to do."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.built: Counter[str] = Counter()
+        self.played: Counter[str] = Counter()
+
+    def submit(self, job: Job) -> None:
+        if isinstance(job, BuildJob):
+            self.built[job.recipe.key] += 1
+        else:
+            self.played.update(task.key for task, _ in job.tasks)
+        super().submit(job)

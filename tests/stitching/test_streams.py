@@ -13,7 +13,9 @@ from scipy.stats import kstest
 
 from stitching.streams import Label, stream
 
-labels = st.lists(st.one_of(st.text(max_size=5), st.integers(-5, 20)), max_size=5).map(tuple)
+labels = st.lists(st.one_of(st.text("a1:>", max_size=4), st.integers(-5, 20)), max_size=5).map(
+    tuple
+)
 
 
 def draws(*names: Label) -> bytes:
@@ -26,9 +28,7 @@ def test_the_same_labels_give_the_same_draws(names: tuple[Label, ...]) -> None:
 
 
 @given(labels, labels)
-def test_other_labels_give_other_draws(
-    names: tuple[Label, ...], others: tuple[Label, ...]
-) -> None:
+def test_other_labels_give_other_draws(names: tuple[Label, ...], others: tuple[Label, ...]) -> None:
     assert (draws(*names) == draws(*others)) == (names == others)
 
 
@@ -67,7 +67,7 @@ def test_a_stream_does_not_disturb_another() -> None:
 def test_draws_are_those_of_the_first_release() -> None:
     """Ledgers and stores outlive a process: a change here would make them all wrong."""
     generator = stream("environment", 0, "maze", 1, 17, "g0>g2")
-    assert generator.bytes(8).hex() == "GOLDEN"
+    assert generator.bytes(8).hex() == "438fad378f188b9a"
 
 
 def test_hash_randomisation_does_not_matter() -> None:

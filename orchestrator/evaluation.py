@@ -1,150 +1,19 @@
-"""The driver: from a plan to a finished ledger. It alone writes."""
+"""Playing the rollout tree: a block at a time, each once its parent's survivors are known."""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Protocol
 
-from orchestrator.errors import BadDataError, ChangedError, IncompleteError
 from orchestrator.executors.protocol import Executor
-from orchestrator.jobs import BlockReport, BlockTask, BuildJob, PlayJob, Report
+from orchestrator.jobs import ATTEMPTS, BlockReport, BlockTask, PlayJob, Report
 from orchestrator.ledger import Ledger, Outcome
 from orchestrator.plan import Node, Plan
-from orchestrator.recipes import Recipe
-from orchestrator.store import CorruptArtifactError, Store
+from orchestrator.progress import Progress
+from orchestrator.store import Store
 
-ATTEMPTS = 3  # of one job, before it is given up
 LARGEST_BUNDLE = 64  # blocks sent to a worker at once
-
-
-class Progress(Protocol):
-    """Is told how far the work is; draws it for a person."""
-
-    def phase(self, name: str, total: int, done: int) -> None: ...
-
-    def advance(self, count: int = 1) -> None: ...
-
-    def say(self, message: str) -> None: ...
-
-
-class Silent:
-    """Progress for tests and benchmarks."""
-
-    def phase(self, name: str, total: int, done: int) -> None: ...
-
-    def advance(self, count: int = 1) -> None: ...
-
-    def say(self, message: str) -> None: ...
-
-
-def verified_artifacts(plan: Plan, store: Store, ledger: Ledger, progress: Progress) -> set[str]:
-    """Keys of the plan's artifacts that are in the store and whole.
-
-    A damaged one is named, set aside and counts as missing. Raises ChangedError when a whole one
-    is not the one that this run's blocks were played with.
-    """
-    whole = set()
-    for key, recipe in plan.recipes.items():
-        if (recipe.kind, key) not in store:
-            continue
-        try:
-            digest = store.read(recipe.kind, key).digest
-        except CorruptArtifactError as error:
-            aside = store.discard(recipe.kind, key)
-            progress.say(f"damaged artifact, will be rebuilt: {error} (set aside as {aside})")
-            continue
-        _check_artifact(ledger, recipe, digest)
-        whole.add(key)
-    return whole
-
-
-def _check_artifact(ledger: Ledger, recipe: Recipe, digest: str) -> None:
-    recorded = ledger.record_artifact(recipe.key, digest)
-    if recorded != digest:
-        raise ChangedError(
-            f"{recipe.kind} {recipe.key} now has other bytes ({digest[:12]}) than when this run "
-            f"began ({recorded[:12]}): it was rebuilt on another kind of machine. Choose another "
-            "--out to start over with it"
-        )
-
-
-@dataclass
-class Builds:
-    """Makes missing artifacts, each as soon as its inputs are there."""
-
-    plan: Plan
-    store: Store
-    ledger: Ledger
-    executor: Executor
-    progress: Progress
-    _attempts: dict[str, int] = field(default_factory=dict)
-
-    def run(self, present: set[str]) -> float:
-        """Build everything not present; returns the seconds that workers were busy with it.
-
-        Raises BadDataError for data or training that cannot be used, IncompleteError for a build
-        that failed three times.
-        """
-        missing = {key: r for key, r in self.plan.recipes.items() if key not in present}
-        for key in self._inputs_of(missing.values()) & present:
-            self._provide(self.plan.recipes[key])
-        self.progress.phase("training", len(self.plan.recipes), len(present))
-        available, submitted, seconds = set(present), set[str](), 0.0
-        while not set(missing) <= available:
-            for key, recipe in missing.items():
-                if key not in submitted and set(recipe.inputs.values()) <= available:
-                    self.executor.submit(BuildJob(recipe))
-                    submitted.add(key)
-            report = self.executor.next()
-            assert isinstance(report.job, BuildJob)
-            recipe = report.job.recipe
-            if self._finish(recipe, report):
-                seconds += report.seconds
-                available.add(recipe.key)
-                self.progress.advance()
-            else:
-                submitted.discard(recipe.key)
-        return seconds
-
-    def _inputs_of(self, recipes: Iterable[Recipe]) -> set[str]:
-        return {key for recipe in recipes for key in recipe.inputs.values()}
-
-    def _provide(self, recipe: Recipe) -> None:
-        self.executor.provide(recipe.key, self.store.read(recipe.kind, recipe.key))
-
-    def _finish(self, recipe: Recipe, report: Report) -> bool:
-        """Keep a built artifact; False when the build is to be tried again."""
-        if report.artifact is not None:
-            made = {
-                "kind": recipe.kind,
-                "params": recipe.params,
-                "inputs": recipe.inputs,
-                "seconds": round(report.seconds, 3),
-            }
-            digest = self.store.write(recipe.kind, recipe.key, report.artifact, made)
-            _check_artifact(self.ledger, recipe, digest)
-            self.executor.provide(recipe.key, report.artifact)
-            return True
-        if report.trouble == "bad data":
-            raise BadDataError(f"{recipe.kind} {recipe.key}: {self._located(recipe, report.error)}")
-        attempts = self._attempts[recipe.key] = self._attempts.get(recipe.key, 0) + 1
-        if attempts >= ATTEMPTS:
-            raise IncompleteError(
-                f"building {recipe.kind} {recipe.key} failed {attempts} times, last with:\n"
-                f"{report.error.strip()}"
-            )
-        self.progress.say(f"building {recipe.kind} again: {report.error.strip().splitlines()[-1]}")
-        return False
-
-    def _located(self, recipe: Recipe, error: str) -> str:
-        """Replace the role of a dataset by its place in the store."""
-        for role, key in recipe.inputs.items():
-            if error.startswith(f"{role}/"):
-                kind = self.plan.recipes[key].kind
-                return f"{self.store.path(kind, key)}{error.removeprefix(role)}"
-        return error
 
 
 @dataclass
@@ -180,7 +49,8 @@ class Evaluation:
 
     def _adopt(self) -> None:
         """Take over blocks that an earlier run over this store has finished."""
-        missing = [key for key in self._place if key not in self.ledger.finished()]
+        finished = self.ledger.finished()
+        missing = [key for key in self._place if key not in finished]
         self.ledger.record(self.shared.raw(missing))
         self._finished = self.ledger.finished()
 
@@ -198,7 +68,7 @@ class Evaluation:
             key = self.plan.tasks[node, chunk].key
             if key in self._finished:
                 self.progress.advance()
-                if self._has_survivors(key):
+                if self._outcome(key).survivors:
                     waiting.extend(self.plan.children.get(node, []))
                 else:
                     self.progress.advance(self._descendants(node))
@@ -211,9 +81,6 @@ class Evaluation:
         """Blocks below a node of one chunk: decided without being played."""
         children = self.plan.children.get(node, [])
         return sum(1 + self._descendants(child) for child in children)
-
-    def _has_survivors(self, key: str) -> bool:
-        return bool(self._outcome(key).arrays["success"].any())
 
     def _outcome(self, key: str) -> Outcome:
         return next(outcome for _, outcome in self.ledger.outcomes([key]))

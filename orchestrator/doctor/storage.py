@@ -1,0 +1,63 @@
+"""Where runs are kept: room, and whether files, locks and databases work there."""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import shutil
+import sqlite3
+import tempfile
+from contextlib import closing
+from pathlib import Path
+
+from orchestrator.doctor.finding import GIB, Finding, gib
+
+LEAST_DISK, ENOUGH_DISK = 1 * GIB, 10 * GIB
+
+
+def check_root(root: Path) -> list[Finding]:
+    """Room, and whether files, locks and databases work there: network disks may lack some."""
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".doctor-", dir=root) as folder:
+            findings = [check_locks(Path(folder)), check_wal(Path(folder))]
+    except OSError as error:
+        advice = "choose another --out, or make this a directory that you may write to"
+        return [Finding("writing", "fault", f"{root}: {error.strerror}", advice)]
+    return [
+        Finding("writing", "ok", str(root)),
+        judge_disk(shutil.disk_usage(root).free),
+        *findings,
+    ]
+
+
+def judge_disk(free: int) -> Finding:
+    found = f"{free / GIB:.1f} GiB free"
+    if free < LEAST_DISK:
+        return Finding("disk", "fault", found, f"free {gib(LEAST_DISK)}, or choose another --out")
+    if free < ENOUGH_DISK:
+        advice = f"enough for a smoke run; a full reproduction wants {gib(ENOUGH_DISK)}"
+        return Finding("disk", "warn", found, advice)
+    return Finding("disk", "ok", found)
+
+
+def check_locks(folder: Path) -> Finding:
+    """A lock that is held must keep a second one out, or two launches would share a run."""
+    with (folder / "lock").open("w") as first, (folder / "lock").open("w") as second:
+        try:
+            fcntl.flock(first, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(second, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            if error.errno == errno.EWOULDBLOCK:
+                return Finding("file locks", "ok", "work")
+    advice = "keep runs on a local disk: two launches here could damage each other"
+    return Finding("file locks", "fault", "do not work", advice)
+
+
+def check_wal(folder: Path) -> Finding:
+    with closing(sqlite3.connect(folder / "database")) as connection:
+        (mode,) = connection.execute("PRAGMA journal_mode=WAL").fetchone()
+        connection.execute("CREATE TABLE t (x)")
+    if mode == "wal":
+        return Finding("SQLite WAL", "ok", "works")
+    return Finding("SQLite WAL", "fault", f"journal mode {mode}", "keep runs on a local disk")

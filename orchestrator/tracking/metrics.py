@@ -1,0 +1,87 @@
+"""The metrics of a view: what the report says, each seed's own scores, learning curves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from orchestrator.tracking.names import allowed_name
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from analysis.run import RunSpec, TableEntry
+
+Curves = dict[str, list[tuple[int, float]]]
+
+EXTRA_ARTIFACT = {"mb-stitch": "dynamics", "mf-stitch": "mf-policy"}
+"""What a method uses beside the agent that all methods share."""
+
+
+def reported(report: Path, table: str) -> dict[str, float]:
+    """Scores and gains as the report gives them; nothing before there is a report."""
+    import pandas as pd
+
+    scores, gains = report / f"{table}.csv", report / f"{table}-gains.csv"
+    if not (scores.is_file() and gains.is_file()):
+        return {}
+    cells = {
+        f"{table}/{cell['row']}/{cell['method']}/{column}": cell[column]
+        for cell in pd.read_csv(scores).to_dict("records")
+        for column in ("score", "ci_low", "ci_high", "episodes")
+    }
+    return cells | {
+        f"{table}/{duel['row']}/{duel['method']} over {duel['baseline']}/{column}": duel[column]
+        for duel in pd.read_csv(gains).to_dict("records")
+        for column in ("gain", "ci_low", "ci_high")
+    }
+
+
+def seed_scores(episodes: pd.DataFrame, spec: RunSpec, entry: TableEntry) -> dict[str, float]:
+    """Scores of one seed by the table's rows, every task weighing the same.
+
+    The interval takes tasks as given and a score for a rate: as no score in [0, 1] varies more
+    than successes and failures of the same mean do, it errs on the wide side.
+    """
+    from analysis.rows import place_tasks
+    from analysis.statistics import wilson
+
+    places = place_tasks(spec, entry)[["task", "row"]]
+    tasks = episodes.merge(places, on="task").groupby(["row", "task"])["score"]
+    rows = tasks.agg(["mean", "size"]).groupby("row").agg({"mean": "mean", "size": "sum"})
+    low, high = wilson(rows["mean"].to_numpy() * rows["size"].to_numpy(), rows["size"].to_numpy())
+    cells = rows.rename(columns={"mean": "score", "size": "episodes"}).assign(
+        ci_low=low, ci_high=high
+    )
+    return {
+        f"{entry.id}/{row}/{column}": value
+        for row, cell in cells.to_dict("index").items()
+        for column, value in cell.items()
+    }
+
+
+def learning_curves(method: str, seed: int, training: list[dict[str, Any]]) -> Curves:
+    """Learning curves of the artifacts that this method uses under this seed."""
+    kinds = {"agent", *(kind for name, kind in EXTRA_ARTIFACT.items() if method.startswith(name))}
+    used = [entry for entry in training if entry["seed"] == seed and entry["kind"] in kinds]
+    several = {e["kind"] for e in used if sum(e["kind"] == other["kind"] for other in used) > 1}
+    curves: Curves = {}
+    for entry in used:
+        kind = entry["kind"]
+        head = f"{kind} {entry['key'][:8]}" if kind in several else kind
+        for name, points in entry["curves"].items():
+            kept = [(step, value) for step, value in points if math.isfinite(value)]
+            curves[allowed_name(f"{head}/{name}")] = kept
+    return curves
+
+
+def finite(*parts: Mapping[str, Any]) -> dict[str, float]:
+    """Metrics under names that MLflow takes; cells without an episode (NaN) have none."""
+    return {
+        allowed_name(name): float(value)
+        for part in parts
+        for name, value in part.items()
+        if not isinstance(value, str | list | None) and math.isfinite(value)
+    }

@@ -1,0 +1,34 @@
+"""Names and texts within what MLflow takes."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from typing import Any
+
+LONGEST_TEXT = 500  # of a param or tag: what every MLflow version takes
+LONGEST_KEY = 250
+
+
+def leaves(plain: Mapping[str, Any], separator: str) -> dict[str, Any]:
+    """Nested dicts as one, their keys joined."""
+    flat: dict[str, Any] = {}
+    for name, value in plain.items():
+        if isinstance(value, dict):
+            below = leaves(value, separator).items()
+            flat |= {f"{name}{separator}{key}": leaf for key, leaf in below}
+        else:
+            flat[name] = value
+    return flat
+
+
+def allowed_name(text: str) -> str:
+    """MLflow takes letters, digits and "_-. :/" in names: "mic → lig" becomes "mic to lig"."""
+    words = re.sub(r"[^\w\-. :/]", " ", text.replace("→", "to")).split()
+    return " ".join(words).replace(" /", "/")[:LONGEST_KEY]
+
+
+def short_text(value: Any) -> str:
+    text = value if isinstance(value, str) else json.dumps(value)
+    return text if len(text) <= LONGEST_TEXT else f"{text[: LONGEST_TEXT - 1]}…"

@@ -1,0 +1,125 @@
+"""MLflow's stores: how to connect to one, and how to take turns at a SQLite file."""
+
+from __future__ import annotations
+
+import fcntl
+import logging
+import os
+import re
+import sqlite3
+import time
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mlflow import MlflowClient
+
+SETTINGS = {
+    "DO_NOT_TRACK": "true",
+    "MLFLOW_DISABLE_TELEMETRY": "true",
+    "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "2",
+    "MLFLOW_HTTP_REQUEST_TIMEOUT": "5",
+    "MLFLOW_SUPPRESS_PRINTING_URL_TO_STDOUT": "true",
+}
+TURN_SECONDS = 30.0  # wait for another skillstitch that writes to the same SQLite store
+LOCK_SECONDS = 10.0  # wait for any other program that has locked it
+
+
+class TrackingError(Exception):
+    """Tracking cannot be used now; the message says why."""
+
+
+def default_uri(root: Path) -> str:
+    """A SQLite store under `root`; its artifacts go to the folder `mlartifacts` beside it."""
+    return f"sqlite:///{root.resolve() / 'mlflow.db'}"
+
+
+def without_password(text: str) -> str:
+    return re.sub(r"//[^/@\s]*@", "//", text)
+
+
+def _database(uri: str) -> Path | None:
+    """The file of a SQLite store, None for any other."""
+    return Path(uri.removeprefix("sqlite:///")) if uri.startswith("sqlite:///") else None
+
+
+def is_gone(uri: str) -> bool:
+    database = _database(uri)
+    return database is not None and not database.exists()
+
+
+@contextmanager
+def turn_to_write(uri: str) -> Iterator[None]:
+    """One publisher at a time for a SQLite store; servers see to that themselves.
+
+    Raises TrackingError if the store stays locked. Asked up front, because MLflow itself would
+    wait 20 seconds in every single call.
+    """
+    database = _database(uri)
+    if database is None:
+        yield
+        return
+    database.parent.mkdir(parents=True, exist_ok=True)
+    with database.with_name(f"{database.name}.lock").open("w") as file:
+        deadline = time.monotonic() + TURN_SECONDS
+        while not _try_lock(file.fileno()):
+            if time.monotonic() > deadline:
+                raise TrackingError(f"another skillstitch kept it busy for {TURN_SECONDS:.0f} s")
+            time.sleep(0.05)
+        if database.exists():
+            _check_unlocked(database)
+        yield
+
+
+def _try_lock(descriptor: int) -> bool:
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+def _check_unlocked(database: Path) -> None:
+    with closing(sqlite3.connect(database, timeout=LOCK_SECONDS)) as connection:
+        try:
+            connection.execute("BEGIN IMMEDIATE")
+        except sqlite3.OperationalError as error:
+            raise TrackingError(f"{error} (waited {LOCK_SECONDS:.0f} s)") from error
+
+
+def connect(uri: str) -> MlflowClient:
+    for name, value in SETTINGS.items():
+        os.environ.setdefault(name, value)
+    from mlflow import MlflowClient
+
+    # What they would say is in the outcome, in one line instead of a traceback.
+    for logger in ("mlflow", "alembic", "urllib3"):
+        logging.getLogger(logger).setLevel(logging.CRITICAL)
+    database = _database(uri)
+    if database is not None and not database.exists():
+        # A migration killed half-way cannot be resumed: the schema appears whole or not at all.
+        draft = database.with_name(f"{database.name}.new")
+        draft.unlink(missing_ok=True)
+        MlflowClient(tracking_uri=f"sqlite:///{draft}").search_experiments(max_results=1)
+        draft.rename(database)
+    return MlflowClient(tracking_uri=uri)
+
+
+def open_experiment(client: MlflowClient, uri: str, name: str) -> str:
+    from mlflow.exceptions import MlflowException
+
+    found = client.get_experiment_by_name(name)
+    if found is None:
+        database = _database(uri)
+        folder = None if database is None else (database.parent.resolve() / "mlartifacts").as_uri()
+        try:
+            return client.create_experiment(name, artifact_location=folder)
+        except MlflowException:  # another publisher to the same server was quicker
+            found = client.get_experiment_by_name(name)
+            if found is None:
+                raise
+    if found.lifecycle_stage != "active":
+        raise TrackingError(f"experiment {name} was deleted there: restore it or use another store")
+    return found.experiment_id

@@ -1,0 +1,140 @@
+"""Kitchen steps per second: a block of episodes against bare physics, and against the original.
+
+    python -m tests.bench.bench_kitchen [episodes] [rounds]
+
+Bare physics is `mj_step(model, data, nstep=40)` alone, from the same states under the same controls
+as the block's episodes, so both do the same work; they take turns, a few steps each. The block's
+time is all that a rollout asks of it: observe, step, achieved. Times are of the CPU, one thread, so
+that neighbours on a shared machine disturb little. Read the ratios: steps per second depend on the
+machine. The last line compares two processes at once with one, by the clock on the wall: read it
+only from a machine that has two cores to spare.
+"""
+
+import sys
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import get_context
+from time import perf_counter, thread_time
+
+import mujoco
+import numpy as np
+from gymnasium_robotics.envs.franka_kitchen.kitchen_env import KitchenEnv
+
+from stitching.envs.kitchen import KITCHEN, PHYSICS, PHYSICS_SIZE, SUBSTEPS, kitchen_model
+from stitching.streams import stream
+
+TURN = 5  # steps
+
+
+class Watch:
+    """CPU seconds spent inside its laps."""
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+
+    @contextmanager
+    def lap(self) -> Iterator[None]:
+        began = thread_time()
+        yield
+        self.seconds += thread_time() - began
+
+
+def smooth_actions(steps: int, episodes: int) -> np.ndarray:
+    """(steps, episodes, 9) float32: a walk that stays in reach of the furniture."""
+    rng = stream("bench")
+    actions = np.zeros((steps, episodes, 9), dtype=np.float32)
+    for step in range(1, steps):
+        nudge = 0.3 * rng.standard_normal((episodes, 9))
+        actions[step] = np.clip(0.9 * actions[step - 1] + nudge, -1, 1)
+    return actions
+
+
+def against_bare_physics(episodes: int, rounds: int) -> None:
+    model, rows = kitchen_model(), np.arange(episodes)
+    actions = smooth_actions(rounds * TURN, episodes).reshape(rounds, TURN, episodes, 9)
+    bare = [mujoco.MjData(model) for _ in rows]
+    watched, rehearsal = KITCHEN.block(), KITCHEN.block()
+    watched.reset([stream("bench", int(row)) for row in rows])
+    block_watch, bare_watch = Watch(), Watch()
+    for turn in range(rounds):
+        before = watched.snapshot(rows)
+        # The controls that the block is about to send, found by playing ahead.
+        rehearsal.restore(before, [stream("bench", turn, int(row)) for row in rows])
+        watched.restore(before, [stream("bench", turn, int(row)) for row in rows])
+        controls = []
+        for step in range(TURN):
+            rehearsal.step(rows, actions[turn, step])
+            controls.append([data.ctrl.copy() for data in rehearsal._pool])
+        for data, snapshot in zip(bare, before, strict=True):
+            mujoco.mj_setState(model, data, snapshot[:PHYSICS_SIZE], PHYSICS)
+
+        def play_block(turn: int = turn) -> None:
+            with block_watch.lap():
+                for step in range(TURN):
+                    watched.observe(rows)
+                    watched.step(rows, actions[turn, step])
+                    watched.achieved(rows, step)
+
+        def play_bare(controls: list[list[np.ndarray]] = controls) -> None:
+            with bare_watch.lap():
+                for step in range(TURN):
+                    for data, control in zip(bare, controls[step], strict=True):
+                        data.ctrl[:] = control
+                        mujoco.mj_step(model, data, nstep=SUBSTEPS)
+
+        for play in (play_block, play_bare) if turn % 2 else (play_bare, play_block):
+            play()
+        for data, positions in zip(bare, watched.positions(rows), strict=True):
+            np.testing.assert_array_equal(data.qpos, positions)  # the same work, indeed
+    steps = rounds * TURN * episodes
+    for name, watch in (("bare", bare_watch), ("block", block_watch)):
+        ratio = bare_watch.seconds / watch.seconds
+        print(f"{name:>10}{steps / watch.seconds:>10.1f}{ratio:>8.3f}")
+    original(bare_watch.seconds / steps)
+
+
+def original(bare_step: float, steps: int = 200) -> None:
+    """The same for gymnasium-robotics' own environment; bare_step: seconds of one bare step."""
+    env, actions, watch = KitchenEnv(), smooth_actions(steps, 1)[:, 0], Watch()
+    env.reset(seed=0)
+    with watch.lap():
+        for action in actions:
+            env.step(action)
+    print(
+        f"{'original':>10}{steps / watch.seconds:>10.1f}{bare_step * steps / watch.seconds:>8.3f}"
+    )
+
+
+def wall_rate(episodes: int, steps: int = 40) -> float:
+    """Episode steps per second of one process, by the clock on the wall."""
+    block, rows = KITCHEN.block(), np.arange(episodes)
+    block.reset([stream("bench", int(row)) for row in rows])
+    block.step(rows, np.zeros((episodes, 9), dtype=np.float32))
+    began = perf_counter()
+    for actions in smooth_actions(steps, episodes):
+        block.observe(rows)
+        block.step(rows, actions)
+        block.achieved(rows, 0)
+    return steps * episodes / (perf_counter() - began)
+
+
+def two_processes(episodes: int) -> None:
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        list(pool.map(wall_rate, [1, 1]))  # both started, model loaded
+        alone = pool.submit(wall_rate, episodes).result()
+        together = sum(pool.map(wall_rate, [episodes] * 2))
+    print(f"{'two cores':>10}{together:>10.1f}{together / alone:>8.3f}  times one process")
+
+
+def main() -> None:
+    given = [int(argument) for argument in sys.argv[1:]]
+    episodes, rounds = (*given, *(10, 40)[len(given) :])
+    print(f"{episodes} episodes, {rounds * TURN} steps each")
+    print(f"{'':>10}{'steps/s':>10}{'ratio':>8}")
+    against_bare_physics(episodes, rounds)
+    two_processes(episodes)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,163 @@
+"""Artifacts: tried again, rebuilt when damaged, refused when unusable or changed."""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from orchestrator import reproduce as reproducing
+from orchestrator.building import Builds
+from orchestrator.errors import BadDataError, ChangedError, IncompleteError
+from orchestrator.executors.serial import SerialExecutor
+from orchestrator.jobs import ATTEMPTS, BuildJob, Report
+from orchestrator.plan import Plan
+from orchestrator.progress import Silent
+from orchestrator.spec import Spec
+from orchestrator.store import Artifact
+from tests.orchestrator.tiny import Counted, Lines, Place, promised_bytes
+
+
+class ForgetfulBuilder(SerialExecutor):
+    """Loses its worker during the first builds of an artifact."""
+
+    def __init__(self, losses: int) -> None:
+        super().__init__()
+        self.losses: Counter[str] = Counter()
+        self.most = losses
+
+    def next(self) -> Report:
+        job = self._jobs[0]
+        if isinstance(job, BuildJob) and job.recipe.kind == "agent":
+            self.losses[job.recipe.key] += 1
+            if self.losses[job.recipe.key] <= self.most:
+                self._jobs.popleft()
+                return Report(job, trouble="lost", error="the worker died")
+        return super().next()
+
+
+def test_a_worker_lost_while_training(
+    plan: Plan, place: Place, finished: Place, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place.out.mkdir()
+    ledger, lines = place.directory.ledger(), Lines()
+    Builds(plan, place.store, ledger, ForgetfulBuilder(2), lines).run(set())
+    for key, recipe in plan.recipes.items():
+        assert (
+            place.store.read(recipe.kind, key).digest
+            == finished.store.read(recipe.kind, key).digest
+        )
+    assert "building agent again: the worker died" in lines.text
+
+
+def test_an_artifact_that_cannot_be_built(spec: Spec, plan: Plan, place: Place) -> None:
+    place.out.mkdir()
+    builds = Builds(
+        plan, place.store, place.directory.ledger(), ForgetfulBuilder(ATTEMPTS), Silent()
+    )
+    with pytest.raises(IncompleteError, match=r"building agent \w+ failed 3 times.*\n.*died"):
+        builds.run(set())
+
+
+def test_a_damaged_artifact_is_named_set_aside_and_rebuilt(
+    spec: Spec, plan: Plan, done: Place, expected: dict[str, bytes], counted: Counted
+) -> None:
+    key = plan.agents[1]
+    file = done.store.path("agent", key) / "arrays.safetensors"
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 1
+    file.write_bytes(content)
+    before = done.store.manifest("agent", key)["digest"]
+    lines = Lines()
+    done.carry_out(spec, lines)
+    assert f"damaged artifact, will be rebuilt: {file}: content does not match" in lines.text
+    (aside,) = (done.store_root / "corrupt").iterdir()
+    assert (aside / "arrays.safetensors").read_bytes() == bytes(content)
+    assert str(aside) in lines.text
+    assert counted.built == {key: 1}
+    assert not counted.played
+    assert done.store.read("agent", key).digest == before
+    assert promised_bytes(done.out) == expected
+    assert done.directory.finished
+
+
+def test_an_artifact_with_other_bytes_than_the_blocks_were_played_with(
+    spec: Spec, plan: Plan, done: Place
+) -> None:
+    """Whole, under the right name, but not what this run's ledger saw."""
+    key = plan.agents[0]
+    real = done.store.read("agent", key)
+    arrays = {name: array + array.dtype.type(1) for name, array in real.arrays.items()}
+    done.store.write("agent", key, Artifact(arrays, real.info), {"kind": "agent"})
+    with pytest.raises(ChangedError, match=rf"agent {key} now has other bytes .* --out") as caught:
+        done.carry_out(spec)
+    assert caught.value.exit_code == 5
+
+
+def test_a_rebuilt_artifact_with_other_bytes(
+    spec: Spec, plan: Plan, done: Place, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As on another kind of machine: the blocks so far do not belong to it."""
+    key = plan.dynamics[0]
+    done.store.discard("dynamics", key)
+
+    class Other(SerialExecutor):
+        def next(self) -> Report:
+            report = super().next()
+            assert report.artifact is not None
+            arrays = {n: a + a.dtype.type(1) for n, a in report.artifact.arrays.items()}
+            return replace(report, artifact=Artifact(arrays, report.artifact.info))
+
+    monkeypatch.setattr(reproducing, "open_executor", lambda *_: Other())
+    with pytest.raises(ChangedError, match=f"dynamics {key}"):
+        done.carry_out(spec)
+
+
+def nan(column: np.ndarray) -> np.ndarray:
+    column = column.copy()
+    column[17, 2] = np.nan
+    return column
+
+
+@pytest.mark.parametrize(
+    ("column", "spoil", "complaint"),
+    [
+        ("observations", nan, "observations.npy: row 17 is not finite"),
+        ("observations", lambda c: c[:, :5], r"observations.npy: shape \(\d+, 5\), expected"),
+        ("actions", lambda c: 3 * c, "actions.npy: row 0 has an action outside"),
+        ("next_observations", lambda c: c[:-1], "next_observations.npy: shape"),
+        ("episode_ends", lambda c: c[::-1], "episode_ends.npy: row 1"),
+        ("episode_skills", lambda c: c + 4, "episode_skills.npy: row 0 names skill 4"),
+    ],
+)
+def test_unusable_data_is_refused_before_training(
+    spec: Spec,
+    plan: Plan,
+    place: Place,
+    finished: Place,
+    monkeypatch: pytest.MonkeyPatch,
+    column: str,
+    spoil: Callable[[np.ndarray], np.ndarray],
+    complaint: str,
+) -> None:
+    key = plan.datasets["demonstrations"]
+    real = finished.store.read("demonstrations", key)
+    arrays = real.arrays | {column: np.ascontiguousarray(spoil(real.arrays[column]))}
+    place.store.write("demonstrations", key, Artifact(arrays, real.info), {"kind": "x"})
+
+    def untouched(*_: object) -> None:
+        raise AssertionError("something was trained on it")
+
+    for name in ("train_iql", "train_dynamics"):
+        monkeypatch.setattr(f"orchestrator.builders.{name}", untouched)
+    folder = place.store.path("demonstrations", key)
+    with pytest.raises(BadDataError, match=rf"{folder}/{complaint}") as caught:
+        place.carry_out(spec)
+    assert caught.value.exit_code == 7
+
+
+def test_training_that_diverges(spec: Spec, place: Place) -> None:
+    diverging = replace(spec, agent=replace(spec.agent, learning_rate=1e30))
+    with pytest.raises(BadDataError, match=r"agent \w+: training diverged: \w+ is (nan|inf)"):
+        place.carry_out(diverging)

@@ -1,0 +1,110 @@
+"""SQLite stores that are missing, locked, deleted or shared; servers that are down."""
+
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+import pytest
+
+from orchestrator.tracking import default_uri, pending, prepare, publish, stores
+from tests.orchestrator.tracking.fake_run import Seen, finish_run, rewind, start_run, train_run
+
+
+def test_a_server_that_is_down_is_said_in_one_line(run_dir: Path) -> None:
+    with closing(socket.socket()) as listener:
+        listener.bind(("127.0.0.1", 0))
+        port = listener.getsockname()[1]
+    uri = f"http://user:secret@127.0.0.1:{port}"
+    start = time.monotonic()
+    outcome = publish(run_dir, uri, finished=True)
+    assert time.monotonic() - start < 15
+    assert not outcome.ok
+    assert "\n" not in outcome.error
+    assert f"127.0.0.1:{port}" in outcome.error
+    assert "secret" not in outcome.error + (run_dir / "tracking.json").read_text()
+    assert pending(run_dir, uri)
+
+
+@contextmanager
+def locked(database: Path) -> Iterator[None]:
+    """Another process holds the database."""
+    code = (
+        "import sqlite3, sys\n"
+        f"connection = sqlite3.connect({str(database)!r})\n"
+        "connection.execute('BEGIN EXCLUSIVE')\n"
+        "print('locked', flush=True); sys.stdin.read()"
+    )
+    pipe = subprocess.PIPE
+    with subprocess.Popen([sys.executable, "-c", code], stdin=pipe, stdout=pipe) as holder:
+        assert holder.stdout is not None
+        assert holder.stdout.readline() == b"locked\n"
+        yield
+        holder.communicate()
+
+
+def test_a_locked_database_is_said_and_made_up_for_later(
+    run_dir: Path, uri: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stores, "LOCK_SECONDS", 1.0)
+    with locked(Path(uri.removeprefix("sqlite:///"))):
+        start = time.monotonic()
+        outcome = publish(run_dir, uri, finished=True)
+        assert time.monotonic() - start < 5
+        assert not outcome.ok
+        assert "locked" in outcome.error
+        assert pending(run_dir, uri)
+    assert publish(run_dir, uri, finished=True).ok
+    assert not pending(run_dir, uri)
+
+
+@pytest.mark.parametrize("uri", ["nonsense://x", "sqlite:////proc/nowhere/mlflow.db"])
+def test_a_store_that_cannot_be_is_no_reason_to_stop(run_dir: Path, uri: str) -> None:
+    outcome = publish(run_dir, uri, finished=True)
+    assert not outcome.ok
+    assert outcome.error
+    assert not prepare(uri).ok or uri.startswith("nonsense")
+
+
+def test_a_deleted_experiment_is_named(run_dir: Path, uri: str) -> None:
+    publish(run_dir, uri, finished=True)
+    seen = Seen(uri)
+    seen.client.delete_experiment(seen.experiment)
+    rewind(run_dir)
+    assert "skillstitch/maze was deleted" in publish(run_dir, uri, finished=True).error
+
+
+def spawn(run_dir: Path, uri: str) -> subprocess.Popen:
+    code = (
+        "from pathlib import Path; from orchestrator.tracking import publish\n"
+        f"outcome = publish(Path({str(run_dir)!r}), {uri!r}, finished=True)\n"
+        "assert outcome.ok, outcome.error"
+    )
+    return subprocess.Popen([sys.executable, "-c", code])
+
+
+def test_runs_that_publish_to_one_new_store_at_the_same_time(tmp_path: Path) -> None:
+    runs = {
+        name: finish_run(train_run(start_run(tmp_path / name, run_id=name)))
+        for name in ("one", "two")
+    }
+    uri = default_uri(tmp_path)  # nobody has created the schema yet
+    processes = [spawn(run_dir, uri) for run_dir in runs.values()]
+    assert [process.wait() for process in processes] == [0, 0]
+    for name in runs:
+        assert Seen(uri, run_id=name).states() == ("FINISHED", {"FINISHED"})
+
+
+def test_a_schema_that_a_background_thread_creates(run_dir: Path, tmp_path: Path) -> None:
+    (tmp_path / "mlflow.db.new").write_bytes(b"what a kill left of an earlier attempt")
+    uri = default_uri(tmp_path)
+    thread = threading.Thread(target=prepare, args=(uri,))
+    thread.start()
+    assert publish(run_dir, uri, finished=True).ok
+    thread.join()
+    assert Seen(uri).states() == ("FINISHED", {"FINISHED"})
+    assert not (tmp_path / "mlflow.db.new").exists()

@@ -1,0 +1,164 @@
+"""The rules of the house: which package may import what, and how long a file may grow.
+
+stitching ← orchestrator ← sweeps;  analysis stands alone;  the command line sees everything
+"""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGES = ("stitching", "orchestrator", "sweeps", "analysis")
+MOST_LINES = 400
+MAY_BE_LONGER: set[str] = set()
+
+SOURCES = {
+    str(path.relative_to(ROOT)): path.read_text()
+    for package in PACKAGES
+    for path in sorted((ROOT / package).rglob("*.py"))
+}
+
+
+def imported(tree: ast.AST, file: str) -> Iterator[tuple[str, ast.AST]]:
+    """Every module named by an import, absolute, and by `import_module` or `__import__`."""
+    package = Path(file).parent.parts
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield alias.name, node
+        elif isinstance(node, ast.ImportFrom):
+            above = package[: len(package) - node.level + 1] if node.level else ()
+            base = ".".join([*above, *([node.module] if node.module else [])])
+            for alias in node.names:
+                yield f"{base}.{alias.name}", node
+        elif isinstance(node, ast.Call) and node.args and isinstance(node.args[0], ast.Constant):
+            function = node.func.attr if isinstance(node.func, ast.Attribute) else node.func
+            name = function.id if isinstance(function, ast.Name) else function
+            if name in ("import_module", "__import__") and isinstance(node.args[0].value, str):
+                yield node.args[0].value, node
+
+
+@cache
+def names_in(source: str, file: str) -> set[str]:
+    return {name for name, _ in imported(ast.parse(source), file)}
+
+
+def importers_of(module: str, within: str = "") -> set[str]:
+    """Files below `within` that import the module or anything in it."""
+    return {
+        file
+        for file, source in SOURCES.items()
+        if file.startswith(within)
+        and any(f"{name}.".startswith(f"{module}.") for name in names_in(source, file))
+    }
+
+
+@pytest.mark.parametrize(
+    ("line", "name"),
+    [
+        ("import ray.util", "ray.util"),
+        ("import numpy, ray as r", "ray"),
+        ("from ray import get", "ray.get"),
+        ("from ray.util import queue", "ray.util.queue"),
+        ("from . import spec", "orchestrator.executors.spec"),
+        ("from ..spec import Spec", "orchestrator.spec.Spec"),
+        ("def f():\n    if x:\n        import ray", "ray"),
+        ("importlib.import_module('ray')", "ray"),
+        ("__import__('ray')", "ray"),
+    ],
+)
+def test_the_reader_of_imports_finds(line: str, name: str) -> None:
+    assert name in names_in(line, "orchestrator/executors/serial.py")
+
+
+def test_the_sources_are_found() -> None:
+    for file in ("stitching/rollout.py", "orchestrator/cli.py", "analysis/report.py"):
+        assert file in SOURCES
+    assert importers_of("torch") >= {"stitching/rollout.py", "stitching/models/iql.py"}
+
+
+@pytest.mark.parametrize(
+    "module", ["ray", "optuna", "mlflow", "orchestrator", "sweeps", "analysis"]
+)
+def test_the_method_knows_nothing_of_what_runs_it(module: str) -> None:
+    assert importers_of(module, within="stitching/") == set()
+
+
+@pytest.mark.parametrize(
+    "module",
+    ["ray", "torch", "mujoco", "optuna", "mlflow", "stitching", "orchestrator", "sweeps"],
+)
+def test_analysis_stands_alone(module: str) -> None:
+    assert importers_of(module, within="analysis/") == set()
+
+
+def test_sweeps_are_known_to_the_command_line_alone() -> None:
+    outside = {file for file in importers_of("sweeps") if not file.startswith("sweeps/")}
+    assert outside <= {"orchestrator/cli.py"}
+
+
+def test_ray_lives_in_its_executor() -> None:
+    assert importers_of("ray") == {"orchestrator/executors/ray.py"}
+
+
+def test_mlflow_lives_in_tracking() -> None:
+    files = importers_of("mlflow")
+    assert files
+    assert all(file.startswith("orchestrator/tracking/") for file in files)
+
+
+@pytest.mark.parametrize("file", sorted(importers_of("mlflow")))
+def test_mlflow_is_loaded_when_it_is_used(file: str) -> None:
+    """It takes seconds to import, and none of the science needs it."""
+    at_import = [
+        node
+        for statement in ast.parse(SOURCES[file]).body
+        if not isinstance(statement, ast.FunctionDef | ast.ClassDef)
+        and not (isinstance(statement, ast.If) and ast.unparse(statement.test) == "TYPE_CHECKING")
+        for node in ast.walk(statement)
+    ]
+    top_level = {name for node in at_import for name, _ in imported(node, file)}
+    assert not any(f"{name}.".startswith("mlflow.") for name in top_level)
+
+
+def test_optuna_lives_in_sweeps() -> None:
+    assert all(file.startswith("sweeps/") for file in importers_of("optuna"))
+
+
+def loaded_by(statement: str) -> set[str]:
+    """Top-level modules in memory after the statement, in a process of its own."""
+    code = f"import sys\n{statement}\nprint(*{{name.partition('.')[0] for name in sys.modules}})"
+    run = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    return set(run.stdout.split())
+
+
+def test_a_report_is_written_without_the_heavy_packages() -> None:
+    """Not by way of anything else either."""
+    loaded = loaded_by("import analysis.report")
+    assert {"analysis", "pandas"} <= loaded
+    heavy = {"torch", "ray", "mujoco", "mlflow", "optuna", "robosuite", "gymnasium_robotics"}
+    assert not loaded & (heavy | {"stitching", "orchestrator", "sweeps"})
+
+
+def test_the_method_plays_without_what_runs_it() -> None:
+    modules = [
+        file.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+        for file in SOURCES
+        if file.startswith("stitching/")
+    ]
+    loaded = loaded_by(f"import {', '.join(modules)}")
+    assert {"stitching", "torch"} <= loaded
+    assert not loaded & {"ray", "mlflow", "optuna", "orchestrator", "sweeps", "analysis", "pandas"}
+
+
+@pytest.mark.parametrize("file", SOURCES)
+def test_files_stay_short_enough_to_read(file: str) -> None:
+    lines = len(SOURCES[file].splitlines())
+    assert (lines <= MOST_LINES) != (file in MAY_BE_LONGER)
