@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -49,29 +48,26 @@ class LazyExecutor:
     """Opens the real executor at the first job: a run that finds everything never starts Ray."""
 
     settings: Settings
-    seconds_to_open: float = 0.0
     opened: Executor | None = field(default=None)
 
-    def _open(self) -> Executor:
+    def open(self) -> Executor:
         if self.opened is None:
-            started = time.perf_counter()
             settings = self.settings
             self.opened = open_executor(settings.executor, settings.workers, settings.address)
-            self.seconds_to_open = time.perf_counter() - started
         return self.opened
 
     @property
     def workers(self) -> int:
-        return self._open().workers
+        return self.open().workers
 
     def provide(self, key: str, artifact: Artifact) -> None:
-        self._open().provide(key, artifact)
+        self.open().provide(key, artifact)
 
     def submit(self, job: Job) -> None:
-        self._open().submit(job)
+        self.open().submit(job)
 
     def next(self) -> Report:
-        return self._open().next()
+        return self.open().next()
 
     def close(self) -> None:
         if self.opened is not None:
@@ -124,10 +120,13 @@ def _carry_out(
         return False
     directory.mark(finished=False)
     directory.write_json("provenance.json", provenance() | {"run_id": run_id})
-    announcement = _announce(directory, settings.resolved_tracking_uri())
     executor = LazyExecutor(settings)
     try:
         watch.lap("preparing")
+        if present != set(plan.recipes):
+            executor.open()
+        watch.lap("starting workers")
+        announcement = _announce(directory, settings.resolved_tracking_uri())
         builds = Builds(plan, store, ledger, executor, progress)
         busy_training = builds.run(present)
         watch.lap("training")
@@ -138,8 +137,6 @@ def _carry_out(
         executor.close()
     announcement.join()
     watch.lap("stopping workers")
-    first_phase = "training" if busy_training else "evaluation"
-    watch.move(executor.seconds_to_open, first_phase, "starting workers")
     with storage_errors(directory.path):
         counts = write_readable(plan, store, ledger, directory)
         episodes = write_episodes(directory.path)

@@ -18,11 +18,6 @@ class Stopwatch:
         self.seconds[phase] = self.seconds.get(phase, 0.0) + now - self._last
         self._last = now
 
-    def move(self, seconds: float, source: str, target: str) -> None:
-        """Part of one phase was really another: a thing done lazily in the middle of it."""
-        self.seconds[source] -= seconds
-        self.seconds[target] = self.seconds.get(target, 0.0) + seconds
-
     def rounded(self) -> dict[str, float]:
         """Seconds by phase so far, to a tenth."""
         return {phase: round(seconds, 1) for phase, seconds in self.seconds.items()}

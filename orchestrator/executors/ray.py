@@ -18,6 +18,7 @@ os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
 
 OBJECT_STORE_BYTES = 512 * 2**20
 JOBS_PER_WORKER = 2  # one running, one waiting, so that no worker idles between jobs
+SECONDS_BETWEEN_CHECKS = 5.0  # for nodes that have gone, where no job finishes
 
 import ray  # noqa: E402
 from ray.exceptions import RayError  # noqa: E402
@@ -49,12 +50,13 @@ class _Player:
         return self._player.play(job, self._artifacts)
 
 
-@dataclass
+@dataclass(eq=False)
 class _Seat:
     """One actor and how many jobs it has been given."""
 
     actor: Any
     jobs: int = 0
+    started: bool = False  # it has finished a job
 
 
 @dataclass
@@ -93,27 +95,63 @@ class RayExecutor:
             self._seat_waiting()
 
     def next(self) -> Report:
-        (reference, *_), _ = ray.wait(list(self._flights), num_returns=1)
-        flight = self._flights.pop(reference)
-        if flight.seat is not None:
-            flight.seat.jobs -= 1
+        reference = self._first_ready()
         try:
             report: Report = ray.get(reference)
         except RayError as error:
-            report = Report(flight.job, trouble="lost", error=_first_line(error))
-            if flight.seat in self._seats:
-                self._seats.remove(flight.seat)
-            self.workers = self._capacity()
+            report = Report(self._lose(reference), trouble="lost", error=_first_line(error))
+        else:
+            seat = self._flights.pop(reference).seat
+            if seat is not None:
+                seat.jobs -= 1
+                seat.started = True
         self._seat_waiting()
         return report
 
     def close(self) -> None:
-        self._release_seats()
-        for reference in self._flights:
+        for seat in list(self._seats):
+            self._dismiss(seat)
+        for reference in self._flights:  # builds: the actors' jobs went with them
             ray.cancel(reference, force=True)
         self._flights.clear()
+        self._waiting.clear()
         if self._owned:
             ray.shutdown()
+
+    def _first_ready(self) -> Any:
+        while True:
+            ready, _ = ray.wait(list(self._flights), num_returns=1, timeout=SECONDS_BETWEEN_CHECKS)
+            if ready:
+                return ready[0]
+            self._dismiss_the_stranded()
+
+    def _dismiss_the_stranded(self) -> None:
+        """Actors for which a lost node has left no core never start: others take their jobs."""
+        self.workers = self._capacity()
+        surplus = max(0, len(self._seats) - self.workers)
+        for seat in [seat for seat in self._seats if not seat.started][:surplus]:
+            self._waiting.extendleft(reversed(self._dismiss(seat)))
+        self._seat_waiting()
+
+    def _lose(self, reference: Any) -> Job:
+        """The job whose worker died. What waited behind it is innocent and goes to another."""
+        seat = self._flights[reference].seat
+        if seat is None:
+            job: Job = self._flights.pop(reference).job
+        else:
+            job, *behind = self._dismiss(seat)
+            self._waiting.extendleft(reversed(behind))
+        self.workers = self._capacity()
+        return job
+
+    def _dismiss(self, seat: _Seat) -> list[PlayJob]:
+        """End an actor; returns the jobs it still had, the one it was busy with first."""
+        self._seats.remove(seat)
+        ray.kill(seat.actor)
+        flights = [item for item in self._flights.items() if item[1].seat is seat]
+        for reference, _ in flights:
+            del self._flights[reference]
+        return [flight.job for _, flight in flights if isinstance(flight.job, PlayJob)]
 
     def _capacity(self) -> int:
         """Cores of all nodes that are alive, up to what was asked for."""
@@ -137,8 +175,7 @@ class RayExecutor:
     def _release_seats(self) -> None:
         """Actors hold a core each; give them back so that training tasks can use them."""
         for seat in [seat for seat in self._seats if not seat.jobs]:
-            self._seats.remove(seat)
-            ray.kill(seat.actor)
+            self._dismiss(seat)
 
 
 def _start(workers: int | None, address: str | None) -> None:

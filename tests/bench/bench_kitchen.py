@@ -5,9 +5,10 @@
 Bare physics is `mj_step(model, data, nstep=40)` alone, from the same states under the same controls
 as the block's episodes, so both do the same work; they take turns, a few steps each. The block's
 time is all that a rollout asks of it: observe, step, achieved. Times are of the CPU, one thread, so
-that neighbours on a shared machine disturb little. Read the ratios: steps per second depend on the
-machine. The last line compares two processes at once with one, by the clock on the wall: read it
-only from a machine that has two cores to spare.
+that neighbours on a shared machine disturb little; the ratio is the median over turns. Read the
+ratios: steps per second depend on the machine. The original plays an episode of its own, so its
+ratio is a rough one. The last line compares two processes at once with one, by the clock on the
+wall: read it only from a machine that has two cores to spare.
 """
 
 import sys
@@ -28,16 +29,20 @@ TURN = 5  # steps
 
 
 class Watch:
-    """CPU seconds spent inside its laps."""
+    """CPU seconds of each of its laps."""
 
     def __init__(self) -> None:
-        self.seconds = 0.0
+        self.laps: list[float] = []
+
+    @property
+    def seconds(self) -> float:
+        return sum(self.laps)
 
     @contextmanager
     def lap(self) -> Iterator[None]:
         began = thread_time()
         yield
-        self.seconds += thread_time() - began
+        self.laps.append(thread_time() - began)
 
 
 def smooth_actions(steps: int, episodes: int) -> np.ndarray:
@@ -89,7 +94,7 @@ def against_bare_physics(episodes: int, rounds: int) -> None:
             np.testing.assert_array_equal(data.qpos, positions)  # the same work, indeed
     steps = rounds * TURN * episodes
     for name, watch in (("bare", bare_watch), ("block", block_watch)):
-        ratio = bare_watch.seconds / watch.seconds
+        ratio = np.median(np.divide(bare_watch.laps, watch.laps))
         print(f"{name:>10}{steps / watch.seconds:>10.1f}{ratio:>8.3f}")
     original(bare_watch.seconds / steps)
 
@@ -101,9 +106,8 @@ def original(bare_step: float, steps: int = 200) -> None:
     with watch.lap():
         for action in actions:
             env.step(action)
-    print(
-        f"{'original':>10}{steps / watch.seconds:>10.1f}{bare_step * steps / watch.seconds:>8.3f}"
-    )
+    rate = steps / watch.seconds
+    print(f"{'original':>10}{rate:>10.1f}{rate * bare_step:>8.3f}")
 
 
 def wall_rate(episodes: int, steps: int = 40) -> float:

@@ -1,15 +1,11 @@
 """Plans per second of CEM at the paper's Kitchen setting: a block at once against one by one.
 
-    python -m tests.bench.bench_planner
-
-Planner as in Table 7; models with random weights, their sizes ours (the paper gives none). Read the
-ratios: they compare timings of one run on one core, while plans per second depend on the machine.
+Planner as in Table 7; models with random weights, their sizes ours (the paper gives none).
 Iterations to convergence depend on the scores, so trained models will take their own number.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from time import perf_counter
 
 import numpy as np
 import torch
@@ -20,6 +16,7 @@ from stitching.models.layers import Params, init_mlp, mlp
 from stitching.planning.cem import CEM
 from stitching.planning.objective import conservative_value
 from stitching.planning.protocol import Plan, Planner
+from tests.bench.result import Result, alternate
 
 MEMBERS, WIDTH, OBSERVATION, ACTION = 5, 256, 59, 9
 ALPHA, BETA = 7.0, 5.0  # Table 7, Kitchen
@@ -66,33 +63,26 @@ def in_blocks(planner: Planner, score: KitchenScore, block: int) -> Iterator[Pla
         yield planner.plan(of_block, streams(range(first, first + block)), ARM)
 
 
-def compare(planner: CEM, problems: int, blocks: tuple[int, ...]) -> None:
-    """One line for each number of problems planned at once; the first is the ratio's unit."""
+def measure() -> Iterator[Result]:
+    yield from _compare("to convergence", KITCHEN, problems=4, blocks=(4,), repetitions=1)
+    rounds = replace(KITCHEN, tolerance=0.0, iterations=10)
+    yield from _compare("10 iterations", rounds, problems=32, blocks=(8, 32), repetitions=3)
+
+
+def _compare(
+    setting: str, planner: CEM, problems: int, blocks: tuple[int, ...], repetitions: int
+) -> Iterator[Result]:
+    """Plan the same problems one by one, and so many at once as each of the blocks says."""
     score = random_score(problems)
-    unit = None
-    print(f"{'at once':>10}{'plans/s':>10}{'ratio':>8}{'iterations':>12}{'objective':>12}")
-    for block in blocks:
-        began = perf_counter()
-        with torch.inference_mode():
-            plans = list(in_blocks(planner, score, block))
-        rate = problems / (perf_counter() - began)
-        unit = unit or rate
-        iterations = torch.cat([plan.iterations for plan in plans]).double().mean()
-        objective = torch.cat([plan.objective for plan in plans]).mean()
-        print(f"{block:>10}{rate:>10.3f}{rate / unit:>8.2f}{iterations:>12.1f}{objective:>12.4f}")
-    print()
-
-
-def main() -> None:
-    torch.set_num_threads(1)
-    to_the_end = replace(KITCHEN, tolerance=0.0)
-    print("4 problems, until convergence")
-    compare(KITCHEN, 4, (1, 4))
-    print("4 problems, all 500 iterations")
-    compare(to_the_end, 4, (1, 4))
-    print("32 problems, 10 iterations")
-    compare(replace(to_the_end, iterations=10), 32, (1, 8, 32))
-
-
-if __name__ == "__main__":
-    main()
+    with torch.inference_mode():
+        one_by_one, *at_once = alternate(
+            repetitions,
+            *(lambda block=block: list(in_blocks(planner, score, block)) for block in (1, *blocks)),
+        )
+    for block, seconds in zip(blocks, at_once, strict=True):
+        yield Result(
+            "planner",
+            f"Kitchen, CEM {setting}: {block} problems at once over one by one",
+            {"plans/s at once": problems / seconds, "one by one": problems / one_by_one},
+            ratio=one_by_one / seconds,
+        )

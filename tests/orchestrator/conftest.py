@@ -8,7 +8,6 @@ import pytest
 
 from orchestrator import reproduce as reproducing
 from orchestrator.executors import open_executor
-from orchestrator.executors.protocol import Executor
 from orchestrator.plan import Plan, make_plan
 from orchestrator.spec import Spec
 from tests.orchestrator.tiny import Counted, Place, promised_bytes, tiny_spec
@@ -56,10 +55,10 @@ def trained(finished: Place, tmp_path: Path) -> Place:
 
 
 @pytest.fixture(scope="session")
-def ray_of_two() -> Iterator[Executor]:
-    """Ray on two cores; executors opened meanwhile join it, up to the workers they ask for."""
-    executor = open_executor("ray", 2, None)
-    yield executor
+def shared_ray() -> Iterator[None]:
+    """One Ray for all tests; executors opened meanwhile join it, up to the workers they ask for."""
+    executor = open_executor("ray", 4, None)
+    yield
     executor.close()
 
 

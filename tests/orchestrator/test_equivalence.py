@@ -8,7 +8,6 @@ import pytest
 
 from orchestrator import reproduce as reproducing
 from orchestrator.builders import load_models
-from orchestrator.executors.protocol import Executor
 from orchestrator.executors.serial import SerialExecutor
 from orchestrator.jobs import Report
 from orchestrator.ledger import Outcome
@@ -103,7 +102,7 @@ def test_ray(
     serial: Place,
     expected: dict[str, bytes],
     place: Place,
-    ray_of_two: Executor,
+    shared_ray: None,
     workers: int,
 ) -> None:
     settings = Settings(

@@ -1,6 +1,8 @@
 """What the orchestrator's tests share: a tiny reproduction, and its promised bytes."""
 
+import sqlite3
 from collections import Counter
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from unittest import mock
@@ -55,6 +57,18 @@ def promised_bytes(run: Path) -> dict[str, bytes]:
     assert len(tables) >= 4
     files = [run / "episodes.parquet", run / "segments.parquet", *tables]
     return {str(file.relative_to(run)): file.read_bytes() for file in files}
+
+
+def blocks_played(out: Path) -> int:
+    """By a run under way in another process, which may not even have begun."""
+    if not (out / "ledger.sqlite").is_file():
+        return 0
+    with closing(sqlite3.connect(out / "ledger.sqlite", timeout=30)) as db:
+        try:
+            (count,) = db.execute("SELECT COUNT(*) FROM blocks").fetchone()
+        except sqlite3.OperationalError:  # the file is there, its tables are not yet
+            return 0
+    return int(count)
 
 
 @dataclass(frozen=True)

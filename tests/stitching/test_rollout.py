@@ -485,27 +485,29 @@ FLOOR = Maze(
 HOME, NORTH, CORNER = range(3)
 
 
-def walker(
-    v_row: Sequence[float] = (0.0,), v_col: Sequence[float] = (0.0,), move: int | None = RIGHT
-) -> Agent:
-    """V of member m is v_row[m] · row + v_col[m] · col; the policy moves so, or anyhow if None."""
-    members = len(v_row)
-    v = np.zeros((members, FLOOR.observation_size + 2, 1))
-    v[:, 0, 0], v[:, 1, 0] = np.array(v_row) * SIDE, np.array(v_col) * SIDE
-    bias = np.zeros((1, 1, 4))
-    if move is not None:
-        bias[..., move] = 50
+def made_by_hand(v: np.ndarray, policy: np.ndarray, bias: np.ndarray) -> Agent:
+    """Linear in observation and condition: v (members, in, 1), policy (1, in, 4), bias (4,)."""
     weights = {
         "observation_mean": np.zeros(FLOOR.observation_size),
         "observation_std": np.ones(FLOOR.observation_size),
         "v.w0": v,
-        "v.b0": np.zeros((members, 1, 1)),
-        "policy.w0": np.zeros((1, FLOOR.observation_size + 2, 4)),
-        "policy.b0": bias,
+        "v.b0": np.zeros((len(v), 1, 1)),
+        "policy.w0": policy,
+        "policy.b0": bias.reshape(1, 1, 4),
         "policy.log_std": np.zeros(4),
     }
     weights = {name: array.astype(np.float32) for name, array in weights.items()}
     return Agent(weights, conditions(FLOOR), FLOOR.actions)
+
+
+def walker(
+    v_row: Sequence[float] = (0.0,), v_col: Sequence[float] = (0.0,), move: int | None = RIGHT
+) -> Agent:
+    """V of member m is v_row[m] · row + v_col[m] · col; the policy moves so, or anyhow if None."""
+    v = np.zeros((len(v_row), FLOOR.observation_size + 2, 1))
+    v[:, 0, 0], v[:, 1, 0] = np.array(v_row) * SIDE, np.array(v_col) * SIDE
+    likes = np.zeros(4) if move is None else 50 * np.eye(4)[move]
+    return made_by_hand(v, np.zeros((1, FLOOR.observation_size + 2, 4)), likes)
 
 
 @dataclass(frozen=True)
@@ -664,6 +666,21 @@ def test_the_policy_takes_over_where_the_stitch_ends() -> None:
     assert [phase for phase, _, _ in log.steps] == ["stitch"] * 2 + ["execute"] * 4
     assert outcome.success.tolist() == [True]
     assert (outcome.stitch_steps.tolist(), outcome.steps.tolist()) == ([2], [6])
+
+
+def test_policy_and_values_are_asked_about_the_skill_being_played() -> None:
+    """V and the liking for going up depend on the goal's row: 1 is north, 6 home, 11 the corner."""
+    columns = FLOOR.observation_size
+    policy, v = np.zeros((1, columns + 2, 4)), np.zeros((1, columns + 2, 1))
+    policy[0, columns, UP], v[0, columns, 0] = -50 * SIDE, SIDE
+    bias = 150 * np.eye(4)[UP] + np.eye(4)[RIGHT]
+    agent = made_by_hand(v, policy, bias)
+    north, log = on_the_floor(agent, NoStitch(), [(4, 6)], skill="north")
+    assert log.path(0) == [(3, 6), (2, 6), (1, 6)]
+    corner, log = on_the_floor(agent, NoStitch(), [(11, 9)], skill="corner")
+    assert log.path(0) == [(11, 10), (11, 11)]
+    for outcome, row in ((north, 1), (corner, 11)):
+        np.testing.assert_allclose([outcome.value_start, outcome.value_end], row, rtol=1e-5)
 
 
 @pytest.mark.parametrize(("limit", "success"), [(3, False), (4, True), (0, True)])

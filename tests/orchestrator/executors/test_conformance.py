@@ -30,7 +30,7 @@ def executor(request: pytest.FixtureRequest, plan: Plan, finished: Place) -> Ite
 
 def opened(kind: ExecutorKind, request: pytest.FixtureRequest) -> Executor:
     if kind == "ray":
-        request.getfixturevalue("ray_of_two")
+        request.getfixturevalue("shared_ray")
     return open_executor(kind, 2, None)
 
 

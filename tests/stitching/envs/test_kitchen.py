@@ -6,7 +6,8 @@ are made alike, so all that is compared is compared as bytes.
 
 import copy
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import mujoco
@@ -62,12 +63,21 @@ HUMAN_SKILLS = [SKILLS.index(s) for s in ("microwave", "kettle", "light switch",
 human = pytest.mark.skipif(not HUMAN.exists(), reason=f"no human demonstrations at {HUMAN}")
 
 
+@cache
+def scratch() -> mujoco.MjData:
+    return mujoco.MjData(kitchen_model())
+
+
+def at(positions: np.ndarray) -> mujoco.MjData:
+    """Where all bodies are, and what touches, at these positions (30,)."""
+    scratch().qpos[:] = positions
+    mujoco.mj_fwdPosition(kitchen_model(), scratch())
+    return scratch()
+
+
 def restless_hand(positions: np.ndarray, skill: str, step: int) -> np.ndarray:
     """An action (9,) that drives the hand around, and so against, a skill's object."""
-    model, data, jacobian = kitchen_model(), mujoco.MjData(kitchen_model()), np.zeros((3, 29))
-    data.qpos[:] = positions
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
+    model, data, jacobian = kitchen_model(), at(positions), np.zeros((3, 29))
     hand, target = model.site("end_effector").id, model.site(SITES[skill]).id
     wander = 0.1 * np.sin(step * np.array([0.13, 0.17, 0.23]))
     gap = data.site_xpos[target] + wander - data.site_xpos[hand]
@@ -100,10 +110,7 @@ def achievements(block: KitchenBlock, rows: np.ndarray) -> np.ndarray:
 
 def touches(positions: np.ndarray) -> int:
     """Contacts between a body of the robot's and one that is not."""
-    model = kitchen_model()
-    data = mujoco.MjData(model)
-    data.qpos[:] = positions
-    mujoco.mj_fwdPosition(model, data)
+    model, data = kitchen_model(), at(positions)
     robot = model.body_rootid[model.jnt_bodyid[0]]
     roots = model.body_rootid[model.geom_bodyid[data.contact.geom]]  # (contacts, 2)
     return int(((roots == robot).sum(axis=1) == 1).sum())
@@ -351,6 +358,30 @@ def test_an_episode_that_diverges_ends_alone(
     assert broken.snapshot(ROWS).tobytes() == sound.snapshot(ROWS).tobytes()
 
 
+@pytest.mark.parametrize("bad", [np.nan, -1e11])
+def test_numbers_gone_bad_in_the_last_substep_are_noticed(
+    bad: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of which MuJoCo would warn in the next step only."""
+    block, real_step = KITCHEN.block(), mujoco.mj_step
+    block.reset(noise())
+    last_seen = block.observe(ROWS)
+    stepped = []
+
+    def step(model: mujoco.MjModel, data: mujoco.MjData, nstep: int) -> None:
+        real_step(model, data, nstep=nstep)
+        stepped.append(block._pool.index(data))
+        if stepped[-1] == 2:
+            data.qvel[28] = bad
+
+    monkeypatch.setattr(mujoco, "mj_step", step)
+    for _ in range(2):
+        block.step(ROWS, np.zeros((7, 9), dtype=np.float32))
+    assert stepped == [0, 1, 2, 3, 4, 5, 6, 0, 1, 3, 4, 5, 6]  # it would cost seconds a step
+    assert np.flatnonzero(block.diverged).tolist() == [2]
+    np.testing.assert_array_equal((block.observe(ROWS) == last_seen).all(axis=1), block.diverged)
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_a_broken_action_is_refused(bad: float) -> None:
     block = KITCHEN.block()
@@ -372,6 +403,9 @@ class Episodes:
     first: np.ndarray
     length: np.ndarray
 
+    def some(self, number: int) -> "Episodes":
+        return replace(self, first=self.first[:number], length=self.length[:number])
+
     def streams(self) -> list[np.random.Generator]:
         """Each was recorded after a reset with the seed 123, as its first observation tells."""
         return [np.random.Generator(np.random.PCG64(123)) for _ in self.length]
@@ -389,18 +423,19 @@ def episodes() -> Episodes:
 def test_human_episodes_are_seen_as_recorded_until_something_is_touched(
     episodes: Episodes,
 ) -> None:
-    """Recorded years ago, with another MuJoCo; the kettle was never quite where it now starts."""
+    """The kettle aside: recorded with another MuJoCo, it settles on its burner a little higher."""
     block, rows = KITCHEN.block(), np.arange(len(episodes.length))
     block.reset(episodes.streams())
     all_but_kettle = np.r_[0:32, 39:53]
     for step in range(20):
         gap = block.observe(rows) - episodes.observations[episodes.first + step]
-        assert np.abs(gap[:, all_but_kettle]).max() < 2e-5, f"step {step}"
+        assert np.abs(gap[:, all_but_kettle]).max() < 1e-6, f"step {step}"
         block.step(rows, episodes.actions[episodes.first + step])
 
 
 @human
 def test_human_episodes_achieve_their_tasks_when_they_did(episodes: Episodes) -> None:
+    episodes = episodes.some(6)  # for the sake of time; all 14 do
     block = KITCHEN.block()
     block.reset(episodes.streams())
     ours = np.full((len(episodes.length), len(HUMAN_SKILLS)), -1)

@@ -1,0 +1,125 @@
+"""What the driver itself costs: planning a block, and taking it from queued to recorded.
+
+Real plans of Table 1 with ever more seeds, the real driver and real ledgers; only the outcomes are
+made up (every skill succeeds, so the whole tree is walked) and arrive at once.
+"""
+
+from __future__ import annotations
+
+import statistics
+from collections import deque
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+
+import numpy as np
+
+from orchestrator.evaluation import Evaluation
+from orchestrator.jobs import BlockReport, Job, PlayJob, Report
+from orchestrator.ledger import Ledger, Outcome
+from orchestrator.plan import Plan, make_plan
+from orchestrator.progress import Silent
+from orchestrator.spec import load_spec
+from orchestrator.store import Artifact, Store
+from stitching.envs.maze import MAZE
+from tests.bench.result import Result
+
+SEEDS = {4: 9, 41: 3, 410: 1}  # to repetitions; 244 blocks a seed: about 10³, 10⁴ and 10⁵
+FLAT = 1.25  # a ratio up to this is the noise of disks
+
+
+class Untrained(Store):
+    """Has any model that is asked for, and nothing in it: nobody plays with them."""
+
+    def read(self, kind: str, key: str) -> Artifact:
+        return Artifact({}, {})
+
+
+class Prophet:
+    """An executor that knows every outcome beforehand."""
+
+    workers = 2
+
+    def __init__(self, episodes: int) -> None:
+        self._episodes = episodes
+        self._outcome = _success(episodes).to_bytes()
+        self._jobs: deque[PlayJob] = deque()
+
+    def provide(self, key: str, artifact: Artifact) -> None: ...
+
+    def submit(self, job: Job) -> None:
+        assert isinstance(job, PlayJob)
+        self._jobs.append(job)
+
+    def next(self) -> Report:
+        job = self._jobs.popleft()
+        blocks = (
+            BlockReport(task.key, self._outcome, segments=self._episodes) for task, _ in job.tasks
+        )
+        return Report(job, blocks=tuple(blocks))
+
+    def close(self) -> None: ...
+
+
+def _success(episodes: int) -> Outcome:
+    """Shaped as `worker.BlockPlayer` makes them."""
+    rng = np.random.default_rng(0)
+    steps = rng.integers(1, 20, size=episodes)
+    return Outcome(
+        {
+            "episode": np.arange(episodes),
+            "success": np.ones(episodes, dtype=bool),
+            "stitch_steps": rng.integers(5, size=episodes),
+            "steps": steps,
+            "end_step": steps,
+            "value_start": rng.random(episodes, dtype=np.float32),
+            "value_end": rng.random(episodes, dtype=np.float32),
+            "snapshots": rng.random((episodes, MAZE.snapshot_size)),
+        }
+    )
+
+
+def measure() -> Iterator[Result]:
+    _plan_and_drive(1)  # the code is fingerprinted once a process, whatever the size of the plan
+    rows = []
+    for seeds, repetitions in SEEDS.items():
+        runs = [_plan_and_drive(seeds) for _ in range(repetitions)]
+        rows.append([statistics.median(column) for column in zip(*runs, strict=True)])
+    blocks, planning, driving = zip(*rows, strict=True)
+    for measured, spent in (("driver's loop", driving), ("expanding the plan", planning)):
+        yield Result(
+            "scheduling",
+            f"{measured}, cost of a block: {blocks[-1]:,.0f} blocks over {blocks[0]:,.0f}",
+            {f"µs at {n:,.0f}": each for n, each in zip(blocks, spent, strict=True)},
+            ratio=spent[-1] / spent[0],
+            at_most=FLAT,
+        )
+
+
+def _plan_and_drive(seeds: int) -> tuple[float, float, float]:
+    """Blocks of a plan, and for each of them the microseconds of planning and of driving."""
+    began = perf_counter()
+    plan = make_plan(replace(load_spec("table1", "quick"), seeds=seeds))
+    blocks = len(plan.tasks)
+    planned = perf_counter()
+    driving = _drive(plan)
+    return blocks, 1e6 * (planned - began) / blocks, 1e6 * driving / blocks
+
+
+def _drive(plan: Plan) -> float:
+    """Seconds from the first block queued to the last one recorded."""
+    with (
+        TemporaryDirectory() as folder,
+        closing(Ledger(Path(folder, "ledger.sqlite"))) as ledger,
+        closing(Ledger(Path(folder, "blocks.sqlite"))) as shared,
+    ):
+        executor = Prophet(plan.spec.episodes)
+        evaluation = Evaluation(plan, Untrained(Path(folder)), ledger, shared, executor, Silent())
+        began = perf_counter()
+        evaluation.run()
+        seconds = perf_counter() - began
+        assert len(ledger.finished()) == len(plan.tasks)
+    return seconds

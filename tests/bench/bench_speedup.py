@@ -1,0 +1,36 @@
+"""Two workers against one: wall seconds of training and evaluation under Ray, start-up apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from tests.bench.result import Result
+from tests.bench.runs import carry_out
+
+# About 40 seconds of one core, in pieces of which even the largest is small beside the whole.
+WORK = """
+    --scale quick --seeds 4 --episodes 40 --tracking-uri none
+    --agent.updates 500 --dynamics.updates 400 --mf-stitch.training.updates 400
+"""
+
+
+def measure() -> Iterator[Result]:
+    with TemporaryDirectory() as folder:
+        one, two = (
+            carry_out(Path(folder, str(workers)), "--workers", str(workers), *WORK.split())
+            for workers in (1, 2)
+        )
+    yield Result(
+        "speedup",
+        "training and evaluation: 2 workers over 1",
+        {
+            f"s {phase}, {run.workers} workers": run.seconds[phase]
+            for phase in ("training", "evaluation")
+            for run in (one, two)
+        }
+        | {f"s busy, {run.workers} workers": sum(run.busy.values()) for run in (one, two)},
+        ratio=one.working / two.working,
+        at_least=1.8,
+    )

@@ -1,0 +1,173 @@
+"""What is Ray's own: who may connect to it, and what becomes of the jobs of workers that die."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+
+import pytest
+
+from orchestrator.errors import UsageError
+from orchestrator.executors import open_executor
+from orchestrator.executors import ray as ray_executor
+from orchestrator.executors.protocol import Executor
+from orchestrator.jobs import BlockTask, BuildJob, Job, PlayJob, Report
+from orchestrator.plan import Plan
+from tests.orchestrator.executors.processes import titled
+from tests.orchestrator.tiny import Place
+
+pytestmark = pytest.mark.ray
+
+PLAYING = "ray::_Player.play"
+BUILDING = "ray::_build"
+
+LISTENERS = """
+from orchestrator.executors import open_executor
+executor = open_executor("ray", 1, None)
+import os, pathlib
+from tests.orchestrator.executors.processes import descendants, title
+sockets = {}
+for process in [os.getpid(), *descendants(os.getpid())]:
+    for entry in pathlib.Path(f"/proc/{process}/fd").iterdir():
+        try:
+            sockets[os.readlink(entry)] = title(process)
+        except OSError:
+            pass
+for table in ("tcp", "tcp6", "udp", "udp6"):
+    for line in pathlib.Path(f"/proc/net/{table}").read_text().splitlines()[1:]:
+        fields = line.split()
+        listening = fields[3] == "0A" or table.startswith("udp")
+        if listening and f"socket:[{fields[9]}]" in sockets:
+            print(table, fields[1].rpartition(":")[0])
+executor.close()
+"""
+LOOPBACK = {"0100007F", "0000000000000000FFFF00000100007F", "00000000000000000000000001000000"}
+
+
+def test_nothing_listens_beyond_loopback() -> None:
+    """A process of its own, because Ray decides when it is imported."""
+    environment = {name: text for name, text in os.environ.items() if not name.startswith("RAY_")}
+    answer = subprocess.run(
+        [sys.executable, "-c", LISTENERS],
+        env=environment | {"PYTHONPATH": os.getcwd()},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    listeners = [line.split() for line in answer.stdout.splitlines()]
+    assert len(listeners) >= 3  # Ray's control store, raylet and workers
+    assert {address for _, address in listeners} <= LOOPBACK
+
+
+def test_no_cluster_at_that_address() -> None:
+    script = (
+        "from orchestrator.executors import open_executor\n"
+        "from orchestrator.errors import UsageError\n"
+        "try:\n    open_executor('ray', None, '127.0.0.1:1')\n"
+        "except UsageError as error:\n    print(error)"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", script],
+        env=os.environ | {"RAY_gcs_rpc_server_reconnect_timeout_s": "1"},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    assert answer.stdout.startswith("no Ray cluster at 127.0.0.1:1: ")
+    assert UsageError.exit_code == 2
+
+
+@pytest.fixture
+def solo(shared_ray: None, plan: Plan, finished: Place) -> Iterator[Executor]:
+    """One worker, so that jobs wait behind each other."""
+    executor = open_executor("ray", 1, None)
+    for key, recipe in plan.recipes.items():
+        executor.provide(key, finished.store.read(recipe.kind, key))
+    yield executor
+    executor.close()
+
+
+def first_skills(plan: Plan) -> list[BlockTask]:
+    return [plan.tasks[node, 0] for node in plan.roots()]
+
+
+def endless(task: BlockTask) -> BlockTask:
+    return replace(task, key="endless", episodes=(0, 10**6))
+
+
+def kill(part: str) -> None:
+    """As soon as a worker of ours is doing this, SIGKILL it."""
+    deadline = time.monotonic() + 60
+    while not (busy := titled(os.getpid(), part)):
+        assert time.monotonic() < deadline, f"nobody is at {part}"
+        time.sleep(0.02)
+    for process in busy:
+        os.kill(process, signal.SIGKILL)
+
+
+def keys(report: Report) -> list[str]:
+    assert isinstance(report.job, PlayJob)
+    return [task.key for task, _ in report.job.tasks]
+
+
+def test_a_killed_player_is_a_lost_report(solo: Executor, plan: Plan) -> None:
+    first, second, *_ = first_skills(plan)
+    solo.submit(PlayJob(((endless(first), None), (second, None))))
+    kill(PLAYING)
+    report = solo.next()
+    assert report.trouble == "lost"
+    assert report.blocks == ()
+    assert keys(report) == ["endless", second.key]
+    assert report.error
+
+    solo.submit(PlayJob(((first, None), (second, None))))
+    report = solo.next()
+    assert report.trouble is None
+    assert [block.outcome is not None for block in report.blocks] == [True, True]
+
+
+def test_what_waits_behind_a_killed_job_is_innocent(solo: Executor, plan: Plan) -> None:
+    first, *others = first_skills(plan)
+    jobs: list[Job] = [PlayJob(((task, None),)) for task in [endless(first), *others]]
+    for job in jobs:
+        solo.submit(job)
+    kill(PLAYING)
+    found = [solo.next() for _ in jobs]
+    assert [(report.trouble, keys(report)) for report in found] == [
+        ("lost", ["endless"]),
+        *((None, [task.key]) for task in others),
+    ]
+
+
+def test_a_killed_build_is_a_lost_report(solo: Executor, plan: Plan) -> None:
+    recipe = plan.recipes[plan.agents[0]]
+    config = recipe.params["config"] | {"updates": 10**6}
+    slow = replace(recipe, params=recipe.params | {"config": config})
+    solo.submit(BuildJob(slow))
+    kill(BUILDING)
+    report = solo.next()
+    assert report.trouble == "lost"
+    assert report.job == BuildJob(slow)
+
+    solo.submit(BuildJob(recipe))
+    assert solo.next().trouble is None
+
+
+def test_actors_that_cannot_start_are_given_up(
+    solo: Executor, plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A lost node takes its cores with it; an actor hired before that is known waits for ever."""
+    monkeypatch.setattr(ray_executor, "SECONDS_BETWEEN_CHECKS", 0.5)
+    solo.workers = 6  # type: ignore[misc]  # as it was believed to be; Ray here has 4 cores
+    jobs = [PlayJob(((task, None),)) for task in first_skills(plan) * 3]
+    for job in jobs:
+        solo.submit(job)
+    assert sorted(key for _ in jobs for key in keys(solo.next())) == sorted(
+        task.key for task in first_skills(plan) * 3
+    )
+    assert solo.workers == 1
