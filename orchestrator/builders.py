@@ -138,4 +138,5 @@ BUILDERS: dict[str, Builder] = {
     "showcase": Builder(_showcase, code="stitching.showcase"),
 }
 
-BLOCK_CODE = "stitching.rollout"
+# What decides a block's outcome: Algorithm 1 with all it imports, and how a worker sets it up.
+BLOCK_CODE = ("stitching.rollout", "orchestrator.methods", "orchestrator.worker")

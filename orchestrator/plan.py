@@ -99,7 +99,7 @@ class Plan:
             "artifacts": artifacts,
             "configs": {kind: to_plain(spec.dynamics) for kind in artifacts if kind == "dynamics"},
         }
-        key = digest(content | {"code": code_fingerprint(BLOCK_CODE)})
+        key = digest(content | {"code": code_fingerprint(*BLOCK_CODE)})
         return BlockTask(key=key, **content)
 
 

@@ -6,7 +6,9 @@ import ast
 import hashlib
 import importlib.metadata
 import importlib.util
+import inspect
 import json
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -15,6 +17,7 @@ from typing import Any
 from orchestrator.builders import BUILDERS
 from orchestrator.structure import Plain
 
+METHOD_PACKAGE = "stitching"
 NUMERIC_PACKAGES = ("numpy", "torch")  # whose versions may change the bytes of any result
 
 
@@ -38,24 +41,26 @@ class Recipe:
 
     @property
     def key(self) -> str:
+        builder = BUILDERS[self.kind]
         return digest(
             {
                 "kind": self.kind,
                 "params": self.params,
                 "inputs": self.inputs,
-                "code": code_fingerprint(BUILDERS[self.kind].code),
+                "code": [function_fingerprint(builder.make), code_fingerprint(builder.code)],
             }
         )
 
 
 @cache
-def code_fingerprint(module: str) -> str:
-    """Hash of a module's syntax tree, those of the `stitching` modules it needs, and packages.
+def code_fingerprint(module: str, *beside: str) -> str:
+    """Hash of the syntax trees of a module and of every `stitching` module that it needs.
 
-    Comments, docstrings and formatting do not matter; any other change does. So an edit to a
-    planner retrains nothing, and an edit to IQL retrains exactly what IQL made.
+    Modules named `beside` are added without what they import. Comments, docstrings and formatting
+    do not matter; any other change does, and so do the versions of the numeric packages. So an edit
+    to a planner retrains nothing, and an edit to IQL retrains exactly what IQL made.
     """
-    trees = {name: _syntax(name) for name in sorted(_closure(module))}
+    trees = {name: _syntax(_tree(name)) for name in sorted(_closure(module) | set(beside))}
     packages = {name: importlib.metadata.version(name) for name in NUMERIC_PACKAGES}
     return digest({"modules": trees, "packages": packages})
 
@@ -79,18 +84,38 @@ def _tree(module: str) -> ast.Module:
     return ast.parse(Path(spec.origin).read_text())
 
 
-def _imports(module: str) -> list[str]:
-    sources = [n.module or "" for n in ast.walk(_tree(module)) if isinstance(n, ast.ImportFrom)]
-    return [source for source in sources if source.startswith("stitching.")]
+def _imports(module: str) -> set[str]:
+    """Modules of the method's package that a module imports, in any form and anywhere in it."""
+    named: set[str] = set()
+    for node in ast.walk(_tree(module)):
+        if isinstance(node, ast.Import):
+            named |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module is not None:
+            named |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+    own = {name for name in named if name.startswith(f"{METHOD_PACKAGE}.")}
+    return {name for name in own if _is_module(name)}
 
 
-def _syntax(module: str) -> str:
-    tree = ast.parse(ast.unparse(_tree(module)))  # a copy, so that the cached tree stays whole
+def _is_module(name: str) -> bool:
+    try:
+        return importlib.util.find_spec(name) is not None
+    except ModuleNotFoundError:  # its parent is a module, and no package
+        return False
+
+
+def _syntax(tree: ast.Module) -> str:
+    """Hash of a syntax tree without its docstrings."""
+    tree = ast.parse(ast.unparse(tree))  # a copy: the given one stays whole
     for node in ast.walk(tree):
         body = getattr(node, "body", None)
         if isinstance(body, list) and body and _is_docstring(body[0]):
-            body[0] = ast.Pass()
+            body[:1] = [] if len(body) > 1 or isinstance(node, ast.Module) else [ast.Pass()]
     return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
+
+
+def function_fingerprint(function: Callable[..., Any]) -> str:
+    """Hash of one function's syntax tree, docstring apart."""
+    return _syntax(ast.parse(inspect.getsource(function)))
 
 
 def _is_docstring(node: Any) -> bool:

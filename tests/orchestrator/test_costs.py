@@ -1,0 +1,91 @@
+"""What a plan says before anything runs: found, missing, decided."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator.costs import estimate, standings
+from orchestrator.ledger import Ledger, Outcome
+from orchestrator.plan import Node, Plan, make_plan
+from orchestrator.printing import plan_lines
+from orchestrator.spec import Spec
+from orchestrator.store import Artifact, Store
+from tests.orchestrator.tiny import tiny_spec
+
+
+@pytest.fixture(scope="module")
+def spec() -> Spec:
+    return tiny_spec()
+
+
+@pytest.fixture(scope="module")
+def plan(spec: Spec) -> Plan:
+    return make_plan(spec)
+
+
+@pytest.fixture
+def shared(tmp_path: Path) -> Iterator[Ledger]:
+    ledger = Ledger(tmp_path / "blocks.sqlite")
+    yield ledger
+    ledger.close()
+
+
+def finish(shared: Ledger, plan: Plan, node: Node, survivors: int) -> None:
+    success = np.arange(plan.spec.episodes) < survivors
+    for chunk, _ in enumerate(plan.chunks):
+        outcome = Outcome({"success": success})
+        shared.record([(plan.tasks[node, chunk].key, outcome.to_bytes())])
+
+
+def test_an_empty_store_finds_nothing(plan: Plan, shared: Ledger, tmp_path: Path) -> None:
+    costs = estimate(plan, Store(tmp_path), shared)
+    assert sum(missing for _, missing in costs.artifacts.values()) == len(plan.recipes)
+    assert sum(sum(counts.values()) for counts in costs.blocks.values()) == len(plan.tasks)
+    assert all(set(counts) == {"missing"} for counts in costs.blocks.values())
+    assert costs.seconds_training > 0
+    assert costs.seconds_evaluation > 0
+
+
+def test_what_nobody_survived_to_is_decided(plan: Plan, shared: Ledger) -> None:
+    dead, alive = (Node(0, "", (skill,)) for skill in plan.spec.skill_names[:2])
+    finish(shared, plan, dead, survivors=0)
+    finish(shared, plan, alive, survivors=1)
+    standing = {(node, task.key): s for node, task, s in standings(plan, shared)}
+    assert len(standing) == len(plan.tasks)
+    for (node, _), state in standing.items():
+        below_dead = node.seed == 0 and node.prefix[0] == dead.prefix[0]
+        if node in (dead, alive):
+            assert state == "found"
+        elif below_dead:
+            assert state == "decided"
+        else:
+            assert state == "missing"
+
+
+def test_found_artifacts_cost_nothing(plan: Plan, shared: Ledger, tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    before = estimate(plan, store, shared)
+    key, recipe = next(iter(plan.recipes.items()))
+    made = {"kind": recipe.kind, "params": recipe.params, "inputs": {}, "seconds": 1.0}
+    store.write(recipe.kind, key, Artifact({}, {}), made)
+    after = estimate(plan, store, shared)
+    assert after.artifacts[recipe.kind] == (1, before.artifacts[recipe.kind][1] - 1)
+    assert after.seconds_training < before.seconds_training
+
+
+def test_times_come_from_this_stores_history(plan: Plan, shared: Ledger, tmp_path: Path) -> None:
+    names = {task.cost_name for task in plan.tasks.values()}
+    for name in names:
+        shared.add_cost(name, segments=10, seconds=20.0)
+    costs = estimate(plan, Store(tmp_path), shared)
+    assert costs.from_history
+    assert costs.seconds_evaluation == pytest.approx(2.0 * costs.segments_in_tree)
+
+
+def test_the_plan_is_printed_for_a_person(plan: Plan, shared: Ledger, tmp_path: Path) -> None:
+    costs = estimate(plan, Store(tmp_path), shared)
+    text = "\n".join(plan_lines(plan.spec, costs, workers=2))
+    for word in ("agent", "MB-Stitch", "first skills", "decided", "on 2", "disk"):
+        assert word in text

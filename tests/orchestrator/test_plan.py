@@ -1,0 +1,108 @@
+"""The plan: every prefix once, first skills shared, and a change re-plays only what it touches."""
+
+from dataclasses import replace
+from itertools import permutations
+
+import pytest
+
+from orchestrator.plan import Node, Plan, make_plan
+from orchestrator.spec import Spec, load_spec
+
+
+@pytest.fixture(scope="module")
+def spec() -> Spec:
+    return load_spec("table1")
+
+
+@pytest.fixture(scope="module")
+def plan(spec: Spec) -> Plan:
+    return make_plan(spec)
+
+
+def block_keys(plan: Plan) -> dict[tuple[Node, int], str]:
+    return {place: task.key for place, task in plan.tasks.items()}
+
+
+def changed(before: Plan, after: Plan) -> set[Node]:
+    ours, theirs = block_keys(before), block_keys(after)
+    assert ours.keys() == theirs.keys()
+    return {node for (node, chunk), key in ours.items() if theirs[node, chunk] != key}
+
+
+def test_nodes_are_the_prefixes_of_all_tasks(plan: Plan, spec: Spec) -> None:
+    prefixes = [p for n in (2, 3, 4) for p in permutations(spec.skill_names, n)]
+    expected = {Node(seed, "", (skill,)) for seed in range(3) for skill in spec.skill_names}
+    expected |= {
+        Node(seed, method, prefix)
+        for seed in range(3)
+        for method in spec.methods
+        for prefix in prefixes
+    }
+    assert len(plan.nodes) == len(set(plan.nodes)) == 3 * (4 + 4 * 60)
+    assert set(plan.nodes) == expected
+
+
+def test_parents_come_first(plan: Plan) -> None:
+    seen: set[Node] = set()
+    for node in plan.nodes:
+        assert node.parent is None or node.parent in seen
+        seen.add(node)
+
+
+def test_artifacts_come_after_their_inputs(plan: Plan) -> None:
+    kinds = [recipe.kind for recipe in plan.recipes.values()]
+    assert {kind: kinds.count(kind) for kind in set(kinds)} == {
+        "demonstrations": 1,
+        "exploration": 1,
+        "agent": 3,
+        "dynamics": 3,
+        "mf-policy": 3,
+        "showcase": 1,
+    }
+    seen: set[str] = set()
+    for key, recipe in plan.recipes.items():
+        assert set(recipe.inputs.values()) <= seen
+        seen.add(key)
+
+
+def test_episodes_are_cut_into_blocks(spec: Spec) -> None:
+    plan = make_plan(replace(spec, episodes=25, block_episodes=10))
+    assert plan.chunks == [(0, 10), (10, 20), (20, 25)]
+    assert len(plan.tasks) == 3 * len(plan.nodes)
+
+
+def test_plans_are_the_same_every_time(plan: Plan, spec: Spec) -> None:
+    again = make_plan(spec)
+    assert block_keys(again) == block_keys(plan)
+    assert list(again.recipes) == list(plan.recipes)
+    assert len(set(block_keys(plan).values())) == len(plan.tasks)
+
+
+def test_alpha_touches_only_mb_stitch_after_the_first_skill(plan: Plan, spec: Spec) -> None:
+    other = make_plan(replace(spec, mb_stitch=replace(spec.mb_stitch, alpha=5.0)))
+    assert changed(plan, other) == {node for node in plan.nodes if node.method == "mb-stitch"}
+    differing = set(plan.recipes) - set(other.recipes)
+    assert {plan.recipes[key].kind for key in differing} == {"showcase"}
+
+
+def test_the_dynamics_touch_only_what_plans_with_them(plan: Plan, spec: Spec) -> None:
+    other = make_plan(replace(spec, dynamics=replace(spec.dynamics, updates=10)))
+    assert changed(plan, other) == {node for node in plan.nodes if node.method == "mb-stitch"}
+
+
+def test_the_agent_touches_everything(plan: Plan, spec: Spec) -> None:
+    other = make_plan(replace(spec, agent=replace(spec.agent, updates=10)))
+    assert changed(plan, other) == set(plan.nodes)
+
+
+def test_more_seeds_methods_or_tasks_touch_nothing(plan: Plan, spec: Spec) -> None:
+    fewer = make_plan(replace(spec, seeds=1, methods=("mb-stitch",), lengths=(2, 3)))
+    theirs = block_keys(plan)
+    assert all(theirs[place] == key for place, key in block_keys(fewer).items())
+    assert set(fewer.recipes) < set(plan.recipes)
+
+
+def test_settings_in_a_methods_name_are_settings(spec: Spec) -> None:
+    plain = make_plan(replace(spec, methods=("mb-stitch",)))
+    named = make_plan(replace(spec, methods=("mb-stitch[alpha=20]",)))
+    assert sorted(block_keys(plain).values()) == sorted(block_keys(named).values())

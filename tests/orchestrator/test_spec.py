@@ -1,0 +1,108 @@
+"""Specs: what is valid, what is refused and how, and that reading one runs nothing."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from orchestrator.errors import UsageError
+from orchestrator.methods import MBStitchConfig, method_label
+from orchestrator.spec import differences, load_spec, packaged_specs, spec_from_plain
+from orchestrator.structure import to_plain
+
+
+@pytest.mark.parametrize("name", packaged_specs())
+@pytest.mark.parametrize("scale", ["smoke", "quick", "paper"])
+def test_packaged_specs_load_at_every_scale(name: str, scale: str) -> None:
+    spec = load_spec(name, scale)
+    assert spec.scale == scale
+    assert spec.tables
+    assert spec_from_plain(json.loads(json.dumps(to_plain(spec))), "copy") == spec
+
+
+def test_table1_is_the_papers_protocol() -> None:
+    spec = load_spec("table1")
+    lengths = [len(task) for task in spec.all_tasks]
+    assert [lengths.count(n) for n in (2, 3, 4)] == [12, 24, 24]
+    assert (spec.episodes, spec.seeds, len(spec.methods)) == (100, 3, 4)
+    assert spec.step_limits == {2: 50, 3: 50, 4: 50}
+    assert (spec.agent.learning_rate, spec.agent.dropout, spec.agent.expectile) == (3e-4, 0.1, 0.7)
+    shooting = spec.mb_stitch.random_shooting
+    assert (shooting.population, shooting.horizon, spec.mb_stitch.execute) == (200, 5, 5)
+
+
+def test_an_unknown_spec_or_scale_lists_what_there_is(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"no spec 'table99'.*table1"):
+        load_spec("table99")
+    with pytest.raises(UsageError, match="no scale 'huge'; it has smoke, quick, paper"):
+        load_spec("table1", "huge")  # type: ignore[arg-type]
+    with pytest.raises(UsageError, match="neither a file"):
+        load_spec(str(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("name = ", "not valid TOML"),
+        ("benchmark = 'chess'", "unknown benchmark 'chess'; there are maze"),
+        ("benchmark = 'maze'\ntitle = ''\nalhpa = 1", "unknown field 'alhpa'; valid are name"),
+        ("benchmark = 'maze'\nname = 'x'\ntitle = ''", "no tasks"),
+        ("benchmark='maze'\nname='x'\ntitle=''\ntasks=['g0>g9']", "no skill 'g9'; it has g0"),
+        ("benchmark='maze'\nname='x'\ntitle=''\ntasks=['g0>g1']", r"none for tasks of 2 skills"),
+    ],
+)
+def test_a_broken_file_is_refused_naming_it(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    with pytest.raises(UsageError, match=rf"(?s)(mine\.toml|spec x).*{message}"):
+        load_spec(str(path))
+
+
+@pytest.mark.parametrize(
+    "bait",
+    [
+        "__import__('pathlib').Path('{}').touch()",
+        "!!python/object/apply:os.system ['touch {}']",
+        "$(touch {})",
+        "cposix\nsystem\n(S'touch {}'\ntR.",
+    ],
+)
+def test_a_malicious_spec_runs_nothing(tmp_path: Path, bait: str) -> None:
+    touched, path = tmp_path / "touched", tmp_path / "mine.toml"
+    value = json.dumps(bait.format(touched))
+    path.write_text(f"benchmark = 'maze'\nname = {value}\ntitle = {value}\nmethods = [{value}]\n")
+    with pytest.raises(UsageError):
+        load_spec(str(path))
+    assert not touched.exists()
+
+
+def test_methods_take_settings() -> None:
+    spec = load_spec("table1")
+    config = spec.method_config("mb-stitch[alpha=1,beta=2.5,norm=max]")
+    assert isinstance(config, MBStitchConfig)
+    assert (config.alpha, config.beta, config.norm) == (1.0, 2.5, "max")
+    assert config.random_shooting == spec.mb_stitch.random_shooting
+    assert method_label("mb-stitch[alpha=1,beta=2.5]") == "MB-Stitch [alpha=1,beta=2.5]"
+
+
+@pytest.mark.parametrize(
+    ("method", "message"),
+    [
+        ("mb-stich", "unknown method 'mb-stich'; there are no-stitch, random-stitch"),
+        ("mb-stitch[alhpa=1]", "unknown field 'alhpa'; valid are limit"),
+        ("mb-stitch[alpha=big]", "alpha: expected float"),
+        ("mb-stitch[alpha=1", "write name or name"),
+        ("mb-stitch[planner=magic]", "'magic' is not one of random-shooting, cem"),
+    ],
+)
+def test_an_unknown_method_or_setting_lists_what_there_is(method: str, message: str) -> None:
+    with pytest.raises(UsageError, match=message):
+        replace(load_spec("table1"), methods=(method,))
+
+
+def test_differences_name_the_fields() -> None:
+    spec = load_spec("table1")
+    changed = replace(spec, seeds=4, mb_stitch=replace(spec.mb_stitch, alpha=3.0))
+    assert differences(spec, changed) == ["mb_stitch.alpha: 20.0 → 3.0", "seeds: 3 → 4"]
+    assert differences(spec, spec) == []
