@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import socket
 from collections import deque
 from dataclasses import dataclass, field
 from typing import Any
@@ -18,6 +19,7 @@ os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
 
 OBJECT_STORE_BYTES = 512 * 2**20
 JOBS_PER_WORKER = 2  # one running, one waiting, so that no worker idles between jobs
+SECONDS_TO_ANSWER = 5.0  # of a cluster's head node
 SECONDS_BETWEEN_CHECKS = 5.0  # for nodes that have gone, where no job finishes
 
 import ray  # noqa: E402
@@ -184,8 +186,9 @@ def _start(workers: int | None, address: str | None) -> None:
     environment = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
     if address is not None:
         try:
+            _knock(address)
             ray.init(address=address, runtime_env={"env_vars": environment}, **common)
-        except (ConnectionError, ValueError, RuntimeError) as error:
+        except (OSError, ValueError, RuntimeError) as error:
             raise UsageError(f"no Ray cluster at {address}: {_first_line(error)}") from error
         return
     os.environ.update(environment)
@@ -196,6 +199,13 @@ def _start(workers: int | None, address: str | None) -> None:
         object_store_memory=OBJECT_STORE_BYTES,
         **common,
     )
+
+
+def _knock(address: str) -> None:
+    """Find out in seconds that nobody is there; Ray itself tries for minutes."""
+    host, _, port = address.rpartition(":")
+    if host and port.isdigit():
+        socket.create_connection((host, int(port)), SECONDS_TO_ANSWER).close()
 
 
 def _first_line(error: Exception) -> str:
