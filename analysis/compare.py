@@ -3,23 +3,15 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from analysis.episodes import episodes_from_segments
 from analysis.rows import place_tasks
 from analysis.run import RunError, RunSpec, load_run
-from analysis.statistics import (
-    bootstrap_means,
-    count_scores,
-    generator,
-    interval,
-    paired_differences,
-    seed_means,
-)
+from analysis.statistics import generator, paired_gain
 
 COLUMNS = [
-    "table", "row", "method", "score_a", "score_b", "difference", "ci_low", "ci_high",
+    "table", "row", "method", "score_a", "score_b", "b_minus_a", "ci_low", "ci_high",
     "pairs", "seeds",
 ]  # fmt: skip
 
@@ -29,14 +21,14 @@ class NothingToCompareError(RunError):
 
 
 def compare(run_a: Path, run_b: Path) -> pd.DataFrame:
-    """COLUMNS, one row for each cell that both runs have; difference = a - b.
+    """COLUMNS, one row for each cell that both runs have; the interval is that of B − A.
 
     Everything is over the episodes (seed, task, episode) that both runs played, so `score_a` may
     differ from the run's own table. Cells without a common episode are left out.
     """
     a, b = load_run(run_a), load_run(run_b)
-    episodes_a = episodes_from_segments(a.segments, a.spec)
-    episodes_b = episodes_from_segments(b.segments, b.spec)
+    episodes_a = episodes_from_segments(a.segments, a.spec, a.quarantine)
+    episodes_b = episodes_from_segments(b.segments, b.spec, b.quarantine)
     key = ["method", "seed", "task", "episode"]
     if episodes_a[key].merge(episodes_b[key], on=key).empty:
         raise NothingToCompareError(_what_differs(a.spec, b.spec))
@@ -45,24 +37,14 @@ def compare(run_a: Path, run_b: Path) -> pd.DataFrame:
         places = place_tasks(a.spec, entry)
         for (row, column), part in places.groupby(["row", "column"], sort=False):
             nodes = part[["method", "task"]]
-            pairs = paired_differences(nodes.merge(episodes_a), nodes.merge(episodes_b))
-            if not pairs.empty:
-                rng = generator("compare", entry.id, str(row), str(column))
-                records.append((entry.id, row, column, *_difference(pairs, rng)))
+            rng = generator("compare", entry.id, str(row), str(column))
+            gain = paired_gain(nodes.merge(episodes_b), nodes.merge(episodes_a), rng)
+            if gain.pairs > 0:
+                records.append(
+                    (entry.id, row, column, gain.score_second, gain.score_first, gain.difference,
+                     gain.low, gain.high, gain.pairs, gain.seeds)
+                )  # fmt: skip
     return pd.DataFrame(records, columns=COLUMNS)
-
-
-def _difference(
-    pairs: pd.DataFrame, rng: np.random.Generator
-) -> tuple[float, float, float, float, float, int, int]:
-    seeds, tasks = pairs["seed"].to_numpy(), pairs["task"].to_numpy()
-    counts = {
-        name: count_scores(pairs[name].to_numpy(), seeds, tasks)
-        for name in ("score_first", "score_second", "difference")
-    }
-    score_a, score_b, difference = (float(seed_means(scores).mean()) for scores in counts.values())
-    low, high = interval(bootstrap_means(counts["difference"], rng))
-    return score_a, score_b, difference, low, high, len(pairs), len(np.unique(seeds))
 
 
 def _what_differs(a: RunSpec, b: RunSpec) -> str:
@@ -91,19 +73,20 @@ def _some(names: Iterable[object]) -> str:
 def comparison_markdown(comparison: pd.DataFrame, name_a: str, name_b: str) -> str:
     """The comparison as text, one table for each table of the runs."""
     lines = [
-        f"# {name_a} against {name_b}",
+        f"# A: {name_a}, B: {name_b}",
         "",
         "Paired over the (seed, task, episode) both runs played; 95 % intervals from a "
-        "hierarchical bootstrap. A difference is marked “apart” if its interval leaves out zero.",
+        "hierarchical bootstrap. Above zero, B scores higher. A difference is marked “apart” if "
+        "its interval leaves out zero.",
     ]
     for table, part in comparison.groupby("table", sort=False):
-        lines += ["", f"## {table}", "", f"| Task | Method | {name_a} | {name_b} | Difference | "
+        lines += ["", f"## {table}", "", f"| Task | Method | A: {name_a} | B: {name_b} | B − A | "
                   "95 % interval | Pairs | Seeds | |", "|" + " --- |" * 9]  # fmt: skip
         for cell in part.to_dict("records"):
             apart = cell["ci_low"] > 0 or cell["ci_high"] < 0
             lines.append(
                 f"| {cell['row']} | {cell['method']} | {cell['score_a']:.3f} | "
-                f"{cell['score_b']:.3f} | {cell['difference']:+.3f} | "
+                f"{cell['score_b']:.3f} | {cell['b_minus_a']:+.3f} | "
                 f"[{cell['ci_low']:+.3f}, {cell['ci_high']:+.3f}] | {cell['pairs']:,} | "
                 f"{cell['seeds']} | {'apart' if apart else ''} |"
             )

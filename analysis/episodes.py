@@ -4,12 +4,15 @@ A task's episode is the walk g0, g0>g1, g0>g1>g2 through the tree. Nothing is si
 tree was played to the longest step limit, and a shorter limit is applied by cutting afterwards.
 """
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from analysis.files import replaced_file
 from analysis.run import SEPARATOR, RunError, RunSpec, load_run, task_length
 
 COLUMNS = ["seed", "method", "task", "length", "episode", "accomplished", "score", "steps"]
@@ -22,21 +25,28 @@ class _Nodes:
 
     outcome: np.ndarray  # ABSENT, FAILED or SUCCEEDED
     end_step: np.ndarray  # steps of the episode up to the end of the segment
+    given_up: np.ndarray  # whether the segment's block was quarantined, reached or not
 
 
-def episodes_from_segments(segments: pd.DataFrame, spec: RunSpec) -> pd.DataFrame:
+def episodes_from_segments(
+    segments: pd.DataFrame, spec: RunSpec, quarantine: Iterable[Mapping[str, Any]] = ()
+) -> pd.DataFrame:
     """One row per (method, task, seed, episode) whose result is known, in the spec's order.
 
-    Columns as in COLUMNS; score = accomplished / length. Episodes that were never played
-    (quarantined blocks, a run still under way) are left out, never taken for failures.
+    Columns as in COLUMNS; score = accomplished / length. What was never played (quarantined
+    blocks, a run still under way) is left out, never taken for failures, and for a task it is left
+    out by whole blocks: were episodes kept that had failed before the missing segment, those that
+    are missing would be the better ones. A block of which no episode came that far has nothing
+    missing, and stays.
     """
+    given_up = list(quarantine)
     if segments.duplicated(["seed", "method", "prefix", "episode"]).any():
         raise RunError("segments.parquet holds a segment twice: the run directory is damaged")
     prefixes = _prefixes(spec.tasks)
     lengths = sorted({task_length(task) for task in spec.tasks})
     frames = []
     for method in spec.methods:
-        nodes = _nodes_of_method(segments, method, prefixes, spec)
+        nodes = _nodes_of_method(segments, method, prefixes, spec, given_up)
         for length in lengths:
             tasks = [task for task in spec.tasks if task_length(task) == length]
             frames.append(_play(nodes, method, tasks, prefixes, spec))
@@ -46,8 +56,9 @@ def episodes_from_segments(segments: pd.DataFrame, spec: RunSpec) -> pd.DataFram
 def write_episodes(run_dir: Path) -> pd.DataFrame:
     """Writes `episodes.parquet` of a run directory, and returns it."""
     run = load_run(run_dir)
-    episodes = episodes_from_segments(run.segments, run.spec)
-    episodes.to_parquet(run_dir / "episodes.parquet", index=False)
+    episodes = episodes_from_segments(run.segments, run.spec, run.quarantine)
+    with replaced_file(run_dir / "episodes.parquet") as draft:
+        episodes.to_parquet(draft, index=False)
     return episodes
 
 
@@ -66,7 +77,11 @@ def _walk(task: str) -> list[str]:
 
 
 def _nodes_of_method(
-    segments: pd.DataFrame, method: str, prefixes: dict[str, int], spec: RunSpec
+    segments: pd.DataFrame,
+    method: str,
+    prefixes: dict[str, int],
+    spec: RunSpec,
+    quarantine: list[Mapping[str, Any]],
 ) -> _Nodes:
     """The method's segments, with the first skills it shares with all others.
 
@@ -95,7 +110,14 @@ def _nodes_of_method(
     end_step = np.zeros(shape, dtype=np.int64)
     outcome[place] = rows["success"].to_numpy(dtype=bool)[asked]
     end_step[place] = rows["end_step"].to_numpy()[asked]
-    return _Nodes(outcome, end_step)
+    given_up = np.zeros(shape, dtype=bool)
+    for block in quarantine:
+        shared = block["method"] == "" and method not in spec.own_first_skill
+        asked_for = block["prefix"] in prefixes and block["seed"] in spec.seeds
+        if asked_for and (shared or block["method"] == method):
+            lost = [episode for episode in block["episodes"] if episode < spec.episodes]
+            given_up[prefixes[block["prefix"]], spec.seeds.index(block["seed"]), lost] = True
+    return _Nodes(outcome, end_step, given_up)
 
 
 def _play(
@@ -116,11 +138,13 @@ def _play(
         end_step = nodes.end_step[walks[:, depth]]
         # With no step left there may be no next segment, and the result is known without it.
         known &= ~(going_on & (outcome == ABSENT) & (steps < limit))
+        known &= ~nodes.given_up[walks[:, depth]]
         played = going_on & (outcome != ABSENT)
         steps = np.where(played, np.minimum(end_step, limit), steps)
         going_on = played & (outcome == SUCCEEDED) & (end_step <= limit)
         accomplished += going_on
 
+    known = _whole_blocks(known, spec.block_episodes)
     task, seed, episode = np.nonzero(known)
     return pd.DataFrame(
         {
@@ -135,3 +159,11 @@ def _play(
         },
         columns=COLUMNS,
     )
+
+
+def _whole_blocks(known: np.ndarray, block_episodes: int) -> np.ndarray:
+    """Takes a task's block of episodes for unknown if one of them is: (tasks, seeds, episodes)."""
+    episodes = known.shape[2]
+    starts = np.arange(0, episodes, block_episodes)
+    whole = np.logical_and.reduceat(known, starts, axis=2)
+    return np.repeat(whole, np.diff(starts, append=episodes), axis=2)

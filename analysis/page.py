@@ -102,8 +102,9 @@ def _quarantine(run: Run) -> str:
     ]
     return (
         '<p class="notice">These blocks of episodes failed again and again and were set aside. '
-        "Their episodes, and all that would have grown from them, are left out of the tables: "
-        "they count neither as successes nor as failures.</p>"
+        "Every task that goes through such a block is shown without any of the block's episodes, "
+        "those that had failed before it included: what is missing then does not depend on how "
+        "an episode went. They count neither as successes nor as failures.</p>"
         + html_table(["Method", "Seed", "Skills", "Episodes", "Last error"], lines)
     )
 

@@ -1,11 +1,18 @@
-"""How tasks are gathered into the rows of a table: one function a way, registered by name."""
+"""How tasks are gathered into the rows of a table: one function a way, registered by name.
 
-from collections.abc import Callable
+Light to import, so that a spec can be checked before anything is run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-
-import pandas as pd
+from typing import TYPE_CHECKING, Protocol
 
 from analysis.run import SEPARATOR, VARIANT, RunError, RunSpec, TableEntry, task_length
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True, order=True)
@@ -55,15 +62,33 @@ ROW_RULES: dict[str, RowRule] = {
 }
 
 
+class NamesItsRows(Protocol):
+    """A table as a spec asks for it."""
+
+    @property
+    def id(self) -> str: ...
+
+    @property
+    def rows(self) -> str: ...
+
+
+def check_tables(tables: Iterable[NamesItsRows]) -> None:
+    """Raises RunError, listing what is known, for a table whose rows cannot be made."""
+    for table in tables:
+        if table.rows not in ROW_RULES:
+            raise RunError(
+                f"table {table.id} wants rows by {table.rows!r}; known are {', '.join(ROW_RULES)}"
+            )
+
+
 def place_tasks(spec: RunSpec, table: TableEntry) -> pd.DataFrame:
     """Every (task, method) with its cell: columns task, method, row, column, sorted by row.
 
     `column` is the method as the table calls it, in the order of the spec's methods.
     """
-    if table.rows not in ROW_RULES:
-        raise RunError(
-            f"table {table.id} wants rows by {table.rows!r}; known are {', '.join(ROW_RULES)}"
-        )
+    import pandas as pd
+
+    check_tables([table])
     rule = ROW_RULES[table.rows]
     places = [
         (rule(task, method, spec, table), task, method)

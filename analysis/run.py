@@ -3,13 +3,16 @@
 The orchestrator writes these files; this module is the only place that knows their names.
 """
 
+from __future__ import annotations
+
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import pandas as pd
+if TYPE_CHECKING:
+    import pandas as pd
 
 SEPARATOR = ">"
 """Joins the skills of a task or prefix: "g0>g1"."""
@@ -51,9 +54,10 @@ class RunSpec:
     tables: tuple[TableEntry, ...]
     skill_labels: Mapping[str, str] = field(default_factory=dict)
     own_first_skill: frozenset[str] = frozenset()  # methods whose first skill nobody shares
+    block_episodes: int = 1  # episodes that are played, and lost, together
 
     @classmethod
-    def from_dict(cls, spec: Mapping[str, Any]) -> "RunSpec":
+    def from_dict(cls, spec: Mapping[str, Any]) -> RunSpec:
         """Reads the resolved spec; keys that no table depends on are left alone."""
         try:
             return cls(
@@ -72,6 +76,7 @@ class RunSpec:
                 own_first_skill=frozenset(
                     m["name"] for m in spec["methods"] if m.get("own_first_skill", False)
                 ),
+                block_episodes=spec.get("spec", {}).get("block_episodes", 1),
             )
         except KeyError as missing:
             raise RunError(f"spec.json has no {missing}: another version wrote it") from None
@@ -108,6 +113,8 @@ class Run:
 
 def load_run(run_dir: Path) -> Run:
     """Reads a run directory, or says what it lacks."""
+    import pandas as pd  # the words above are used where pandas need not be paid for
+
     segments = run_dir / "segments.parquet"
     for needed in (run_dir / "spec.json", segments):
         if not needed.is_file():

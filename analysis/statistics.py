@@ -137,6 +137,46 @@ def paired_differences(first: pd.DataFrame, second: pd.DataFrame) -> pd.DataFram
     return pairs[["seed", "task", "score_first", "score_second", "difference"]]
 
 
+@dataclass(frozen=True)
+class Gain:
+    """How far one side is over another, over the episodes that both have; NaN if there are none."""
+
+    difference: float  # first - second
+    low: float
+    high: float
+    score_first: float
+    score_second: float
+    pairs: int
+    seeds: int
+
+    @property
+    def relative(self) -> float:
+        """The difference in units of the second's score; NaN if that is zero."""
+        return self.difference / self.score_second if self.score_second > 0 else np.nan
+
+
+def paired_gain(first: pd.DataFrame, second: pd.DataFrame, rng: np.random.Generator) -> Gain:
+    """The first over the second, every task and every seed weighing the same."""
+    pairs = paired_differences(first, second)
+    if pairs.empty:
+        return Gain(np.nan, np.nan, np.nan, np.nan, np.nan, pairs=0, seeds=0)
+    seeds, tasks = pairs["seed"].to_numpy(), pairs["task"].to_numpy()
+    differences, firsts, seconds = (
+        count_scores(pairs[name].to_numpy(), seeds, tasks)
+        for name in ("difference", "score_first", "score_second")
+    )
+    low, high = interval(bootstrap_means(differences, rng))
+    return Gain(
+        float(seed_means(differences).mean()),
+        low,
+        high,
+        float(seed_means(firsts).mean()),
+        float(seed_means(seconds).mean()),
+        len(pairs),
+        len(differences.counts),
+    )
+
+
 def wilson(successes: np.ndarray, trials: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Wilson's interval of rates: unlike ±1.96 σ it stays in [0, 1] and is right near both ends.
 

@@ -9,15 +9,7 @@ import pandas as pd
 from analysis.paper import paper_scores
 from analysis.rows import column_labels, place_tasks
 from analysis.run import RunSpec, TableEntry
-from analysis.statistics import (
-    bootstrap_means,
-    count_scores,
-    estimate,
-    generator,
-    interval,
-    paired_differences,
-    seed_means,
-)
+from analysis.statistics import count_scores, estimate, generator, paired_gain
 
 SCORE_COLUMNS = [
     "row", "method", "score", "variance", "std", "ci_low", "ci_high", "episodes", "seeds",
@@ -118,7 +110,10 @@ def gain_table(cells: Cells, pairs: list[tuple[str, str, str]], entry: TableEntr
             cells[row, baseline],
             generator("gain", entry.id, row, method, baseline),
         )
-        records.append((row, method, baseline, *gain))
+        records.append(
+            (row, method, baseline, gain.difference, gain.low, gain.high, gain.relative,
+             gain.pairs, gain.seeds)
+        )  # fmt: skip
     return pd.DataFrame(records, columns=GAIN_COLUMNS)
 
 
@@ -126,25 +121,6 @@ def _only(gains: pd.DataFrame, pairs: list[tuple[str, str, str]]) -> pd.DataFram
     """The lines of these (row, method, baseline), in this order."""
     by_pair = {gain[:3]: gain for gain in gains.itertuples(index=False, name=None)}
     return pd.DataFrame([by_pair[pair] for pair in pairs], columns=GAIN_COLUMNS)
-
-
-def paired_gain(
-    first: pd.DataFrame, second: pd.DataFrame, rng: np.random.Generator
-) -> tuple[float, float, float, float, int, int]:
-    """(gain, ci_low, ci_high, relative_gain, pairs, seeds) of the first over the second.
-
-    The relative gain is to the second's score over the same episodes; NaN if that is zero.
-    """
-    pairs = paired_differences(first, second)
-    if pairs.empty:
-        return np.nan, np.nan, np.nan, np.nan, 0, 0
-    seeds, tasks = pairs["seed"].to_numpy(), pairs["task"].to_numpy()
-    differences = count_scores(pairs["difference"].to_numpy(), seeds, tasks)
-    gain = float(seed_means(differences).mean())
-    low, high = interval(bootstrap_means(differences, rng))
-    base = float(seed_means(count_scores(pairs["score_second"].to_numpy(), seeds, tasks)).mean())
-    relative = gain / base if base > 0 else np.nan
-    return gain, low, high, relative, len(pairs), len(differences.counts)
 
 
 def _gain_pairs(cells: Cells, entry: TableEntry) -> list[tuple[str, str, str]]:

@@ -24,7 +24,9 @@ EXPLANATION = (
     f"“{AGREES}”: the paper's score lies in our 95 % interval or within {NEAR} of our score; "
     f"otherwise “{HIGHER}” or “{LOWER}” says where ours is. A claim “{HOLDS}” if its 95 % "
     f"interval lies wholly on its side of zero, “{FAILS}” if wholly on the other, and is "
-    f"“{UNDECIDED}” if the interval contains zero."
+    f"“{UNDECIDED}” if the interval contains zero. Only the claim of a constant number of "
+    f"accomplished skills is judged without an interval: it “{HOLDS}” if our numbers lie within "
+    f"{SAME_SKILLS} of each other at all lengths, and else “{FAILS}”."
 )
 
 

@@ -11,8 +11,8 @@ import numpy as np
 from orchestrator.methods import make_stitcher
 from orchestrator.store import Artifact
 from orchestrator.structure import Plain, structure
-from stitching.data import maze as maze_data
 from stitching.data.experience import mixed_conditions, mixed_experience, skill_experience
+from stitching.data.maze import MazeDataConfig, exploration, skill_demonstrations
 from stitching.data.transitions import Transitions, check, concatenate
 from stitching.envs.maze import MAZE
 from stitching.envs.protocol import Benchmark, conditions
@@ -32,7 +32,7 @@ class Builder:
     """A pure function from parameters and inputs to an artifact."""
 
     make: Callable[[Plain, Inputs], Artifact]
-    code: str  # the module whose code, with all it imports, decides the content
+    code: tuple[str, ...]  # the modules whose code, with all they import, decides the content
 
 
 def _dataset(data: Transitions) -> Artifact:
@@ -45,14 +45,14 @@ def _dataset(data: Transitions) -> Artifact:
     return Artifact(data.columns(), info)
 
 
-def _demonstrations(params: Plain, inputs: Inputs) -> Artifact:
-    config = structure(maze_data.MazeDataConfig, params["config"], "data")
-    return _dataset(maze_data.skill_demonstrations(MAZE, config, params["root_seed"]))
+def _maze_demonstrations(params: Plain, inputs: Inputs) -> Artifact:
+    config = structure(MazeDataConfig, params["config"], "data")
+    return _dataset(skill_demonstrations(MAZE, config, params["root_seed"]))
 
 
-def _exploration(params: Plain, inputs: Inputs) -> Artifact:
-    config = structure(maze_data.MazeDataConfig, params["config"], "data")
-    return _dataset(maze_data.exploration(MAZE, config, params["root_seed"]))
+def _maze_exploration(params: Plain, inputs: Inputs) -> Artifact:
+    config = structure(MazeDataConfig, params["config"], "data")
+    return _dataset(exploration(MAZE, config, params["root_seed"]))
 
 
 def _checked_data(params: Plain, inputs: Inputs) -> tuple[Benchmark, Transitions]:
@@ -94,8 +94,8 @@ def _dynamics(params: Plain, inputs: Inputs) -> Artifact:
     return _trained(train_dynamics(data, config, *_labels("dynamics", params)))
 
 
-def _showcase(params: Plain, inputs: Inputs) -> Artifact:
-    models = load_models(BENCHMARKS[params["benchmark"]], params["configs"], inputs)
+def _maze_showcase(params: Plain, inputs: Inputs) -> Artifact:
+    models = load_models(MAZE, params["configs"], inputs)
     stitchers = {
         method: make_stitcher(method, settings, MAZE, models["agent"], models)
         for method, settings in params["methods"].items()
@@ -129,14 +129,37 @@ def load_models(benchmark: Benchmark, configs: Plain, artifacts: Inputs) -> dict
     return models
 
 
-BUILDERS: dict[str, Builder] = {
-    "demonstrations": Builder(_demonstrations, code="stitching.data.maze"),
-    "exploration": Builder(_exploration, code="stitching.data.maze"),
-    "agent": Builder(_agent, code="stitching.models.iql"),
-    "mf-policy": Builder(_mf_policy, code="stitching.models.iql"),
-    "dynamics": Builder(_dynamics, code="stitching.models.dynamics"),
-    "showcase": Builder(_showcase, code="stitching.showcase"),
-}
+PLANNERS = ("stitching.planning.cem", "stitching.planning.random_shooting")
 
-# What decides a block's outcome: Algorithm 1 with all it imports, and how a worker sets it up.
-BLOCK_CODE = ("stitching.rollout", "orchestrator.methods", "orchestrator.worker")
+BUILDERS: dict[str, Builder] = {
+    "maze-demonstrations": Builder(_maze_demonstrations, ("stitching.data.maze",)),
+    "maze-exploration": Builder(_maze_exploration, ("stitching.data.maze",)),
+    "maze-showcase": Builder(_maze_showcase, ("stitching.showcase", *PLANNERS)),
+    "agent": Builder(_agent, ("stitching.models.iql", "stitching.data.experience")),
+    "mf-policy": Builder(_mf_policy, ("stitching.models.iql", "stitching.data.experience")),
+    "dynamics": Builder(_dynamics, ("stitching.models.dynamics",)),
+}
+# What decides a block's outcome beside the models: Algorithm 1 and the planners.
+BLOCK_CODE = ("stitching.rollout", *PLANNERS)
+# And how work is set up, without the method's code that these import for other purposes.
+SETUP_CODE = ("orchestrator.builders", "orchestrator.methods", "orchestrator.worker")
+
+
+@dataclass(frozen=True)
+class Kit:
+    """What a benchmark brings along: its settings, its data, and perhaps a recorded figure."""
+
+    data: type[MazeDataConfig]
+    datasets: dict[str, str]  # role → kind; skills learn from "demonstrations", dynamics from all
+    showcase: str | None = None  # kind
+    shown_task: tuple[str, ...] = ()  # in the showcase, where the spec has it
+
+
+KITS: dict[str, Kit] = {
+    "maze": Kit(
+        MazeDataConfig,
+        {"demonstrations": "maze-demonstrations", "exploration": "maze-exploration"},
+        showcase="maze-showcase",
+        shown_task=("g0", "g1", "g3", "g2"),  # the paper's Figure 1
+    ),
+}

@@ -57,16 +57,17 @@ class Builds:
     progress: Progress
     _attempts: dict[str, int] = field(default_factory=dict)
 
-    def run(self, present: set[str]) -> float:
-        """Build everything not present; returns the seconds that workers were busy with it.
+    def run(self, wanted: set[str], present: set[str], phase: str = "training") -> float:
+        """Build what is wanted and not present; returns the seconds that workers were busy.
 
         Raises BadDataError for data or training that cannot be used, IncompleteError for a build
         that failed three times.
         """
-        missing = {key: r for key, r in self.plan.recipes.items() if key not in present}
+        recipes = self.plan.recipes
+        missing = {key: r for key, r in recipes.items() if key in wanted - present}
         for key in self._inputs_of(missing.values()) & present:
-            self._provide(self.plan.recipes[key])
-        self.progress.phase("training", len(self.plan.recipes), len(present))
+            self._provide(recipes[key])
+        self.progress.phase(phase, len(wanted), len(wanted & present))
         available, submitted, seconds = set(present), set[str](), 0.0
         while not set(missing) <= available:
             for key, recipe in missing.items():

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -150,9 +151,23 @@ def _run(words: list[str]) -> None:
 
 def _export(run: Path, results: Path) -> None:
     from analysis.report import export_results
+    from orchestrator.rundir import RunDirectory
 
-    for folder in export_results(run, results):
+    with RunDirectory(run).locked(), _clear_errors():
+        folders = export_results(run, results)
+    for folder in folders:
         OUTPUT.print(f"exported {folder}", markup=False)
+
+
+@contextmanager
+def _clear_errors() -> Iterator[None]:
+    """The analysis refuses with ValueErrors of its own, written for users."""
+    from analysis.run import RunError
+
+    try:
+        yield
+    except RunError as error:
+        raise UsageError(str(error)) from error
 
 
 def _status(words: list[str]) -> None:
@@ -187,8 +202,11 @@ def _report(words: list[str]) -> None:
             run: the run directory.
             results: also export each table to RESULTS/<table>/.
         """
-        RunDirectory(run).spec()  # a clear error where there is no run
-        OUTPUT.print(f"wrote {build_report(run)}", markup=False)
+        directory = RunDirectory(run)
+        directory.spec()  # a clear error where there is no run
+        with directory.locked(), _clear_errors():
+            page = build_report(run)
+        OUTPUT.print(f"wrote {page}", markup=False)
         if results is not None:
             _export(run, results)
         if trouble := catch_up(RunDirectory(run)):
@@ -207,7 +225,8 @@ def _compare(words: list[str]) -> None:
             run_a: a run directory.
             run_b: another; differences are B − A.
         """
-        text = comparison_markdown(compare(run_a, run_b), run_a.name, run_b.name)
+        with _clear_errors():
+            text = comparison_markdown(compare(run_a, run_b), run_a.name, run_b.name)
         OUTPUT.print(text, markup=False, soft_wrap=True)
 
     tyro.cli(both, args=words, prog="skillstitch compare")

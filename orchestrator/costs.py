@@ -15,12 +15,12 @@ from orchestrator.store import CorruptArtifactError, Store
 
 # Where this store has no history yet: measured on one core of a 2-core cloud machine.
 REFERENCE_SECONDS = {
-    "demonstrations": 1.0,
-    "exploration": 1.0,
+    "maze-demonstrations": 1.0,
+    "maze-exploration": 1.0,
+    "maze-showcase": 1.0,
     "agent": 20.0,
     "mf-policy": 10.0,
     "dynamics": 15.0,
-    "showcase": 1.0,
 }
 REFERENCE_SECONDS_PER_SEGMENT = 0.005
 BYTES_PER_SEGMENT = 120

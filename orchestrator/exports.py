@@ -65,6 +65,8 @@ def learning_curves(plan: Plan, store: Store) -> list[Plain]:
     """Curves of every trained artifact of the plan."""
     curves = []
     for key, recipe in plan.recipes.items():
+        if key == plan.showcase:
+            continue
         info = store.read(recipe.kind, key).info
         if "curves" in info:
             curves.append(
@@ -83,8 +85,9 @@ def datasets(plan: Plan, store: Store) -> list[Plain]:
     """What was learned from: rows, episodes and content digest of each dataset."""
     listing = []
     for name, key in plan.datasets.items():
-        info = store.read(name, key).info
-        digest = store.manifest(name, key)["digest"]
+        kind = plan.recipes[key].kind
+        info = store.read(kind, key).info
+        digest = store.manifest(kind, key)["digest"]
         listing.append(
             {"name": name, "key": key, "digest": digest}
             | {field: info[field] for field in ("rows", "episodes", "successes")}
@@ -100,7 +103,9 @@ def write_readable(plan: Plan, store: Store, ledger: Ledger, directory: RunDirec
     directory.write_json("training.json", learning_curves(plan, store))
     directory.write_json("datasets.json", datasets(plan, store))
     if plan.showcase is not None:
-        directory.write_json("showcase.json", store.read("showcase", plan.showcase).info)
+        kind = plan.recipes[plan.showcase].kind
+        if (kind, plan.showcase) in store:
+            directory.write_json("showcase.json", store.read(kind, plan.showcase).info)
     return {
         "segments played": len(segments),
         "environment steps": int(segments["steps"].sum()),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -11,6 +12,8 @@ from orchestrator.ledger import Ledger
 from orchestrator.plan import make_plan
 from orchestrator.rundir import RunDirectory
 from orchestrator.store import Store
+
+SECONDS_TO_WRITE = 3600
 
 
 def collect_garbage(store_root: Path, runs: Sequence[Path], *, delete: bool) -> Iterator[str]:
@@ -22,8 +25,13 @@ def collect_garbage(store_root: Path, runs: Sequence[Path], *, delete: bool) -> 
         raise UsageError("name the run directories to keep, for example runs/table1-paper")
     needed: set[str] = set()
     for run in runs:
-        plan = make_plan(RunDirectory(run).spec())
+        directory = RunDirectory(run)
+        plan = make_plan(directory.spec())
         needed |= set(plan.recipes) | {task.key for task in plan.tasks.values()}
+        # The run may have been made by other code, under which the same things had other names.
+        ledger = directory.ledger(read_only=True)
+        needed |= ledger.artifacts() | ledger.finished()
+        ledger.close()
     store = Store(store_root)
     verb = "deleted" if delete else "would delete"
     freed = 0
@@ -35,15 +43,18 @@ def collect_garbage(store_root: Path, runs: Sequence[Path], *, delete: bool) -> 
                 shutil.rmtree(folder)
             yield f"{verb} {folder}"
     for leftovers in (store_root / "incoming", store_root / "corrupt"):
-        if leftovers.is_dir() and any(leftovers.iterdir()):
-            freed += _size(leftovers)
+        for folder in sorted(leftovers.glob("*")):
+            if time.time() - folder.stat().st_mtime < SECONDS_TO_WRITE:
+                continue  # somebody may be writing it
+            freed += _size(folder)
             if delete:
-                shutil.rmtree(leftovers)
-            yield f"{verb} {leftovers}"
+                shutil.rmtree(folder)
+            yield f"{verb} {folder}"
     shared = Ledger(store_root / "blocks.sqlite")
     stale = shared.finished() - needed
     if delete:
         shared.forget(stale)
+        shared.shrink()
     shared.close()
     yield f"{verb} {len(stale)} blocks; artifacts freed {freed / 1e6:.1f} MB"
     if not delete:

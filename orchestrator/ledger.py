@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from safetensors.numpy import load, save
 
-from orchestrator.errors import NondeterminismError, StorageError
+from orchestrator.errors import IncompleteError, NondeterminismError, StorageError
 from orchestrator.store import storage_errors
 
 SCHEMA = """
@@ -102,7 +102,8 @@ class Ledger:
     def outcomes(self, keys: Iterable[str]) -> Iterator[tuple[str, Outcome]]:
         """Recorded outcomes in the order asked for; keys not recorded are skipped.
 
-        Raises NondeterminismError when stored bytes no longer match their digest.
+        Raises IncompleteError when stored bytes no longer match their digest; that block is
+        forgotten, so the next command plays it again.
         """
         return ((key, Outcome.from_bytes(data)) for key, data in self.raw(keys))
 
@@ -117,7 +118,11 @@ class Ledger:
                 continue
             digest, data = row
             if hashlib.sha256(data).hexdigest() != digest:
-                raise NondeterminismError(f"{self.path}: block {key} is damaged on disk")
+                self.forget([key])
+                raise IncompleteError(
+                    f"{self.path}: block {key} was damaged on disk and has been removed; "
+                    "the same command plays it again"
+                )
             yield key, data
 
     def record_artifact(self, key: str, digest: str) -> str:
@@ -126,6 +131,10 @@ class Ledger:
             self._db.execute("INSERT OR IGNORE INTO artifacts VALUES (?, ?)", (key, digest))
         (known,) = self._db.execute("SELECT digest FROM artifacts WHERE key = ?", (key,)).fetchone()
         return str(known)
+
+    def artifacts(self) -> set[str]:
+        """Keys of all artifacts that blocks were played with."""
+        return {key for (key,) in self._db.execute("SELECT key FROM artifacts")}
 
     def record_failure(self, key: str, error: str) -> int:
         """Count a failed attempt at a block; returns how many there have been."""
@@ -142,9 +151,12 @@ class Ledger:
         return {key: (attempt, error) for key, attempt, error in rows}
 
     def forget(self, keys: Iterable[str]) -> None:
-        """Remove blocks that nobody needs and give their space back to the disk."""
+        """Remove blocks."""
         with self._transaction():
             self._db.executemany("DELETE FROM blocks WHERE key = ?", [(key,) for key in keys])
+
+    def shrink(self) -> None:
+        """Give the space of removed blocks back to the disk."""
         with self._storage_errors():
             self._db.execute("VACUUM")
 
@@ -180,6 +192,10 @@ class Ledger:
         except sqlite3.OperationalError as error:
             if getattr(self, "_db", None) is not None and self._db.in_transaction:
                 self._db.execute("ROLLBACK")
+            if "locked" in str(error):
+                raise IncompleteError(
+                    f"{self.path} is held by another process; wait and run the same command again"
+                ) from error
             raise StorageError(
                 f"cannot write {self.path}: {error}; make room and run the same command again"
             ) from error

@@ -118,7 +118,7 @@ def make_stitcher(
         return RandomStitch(benchmark.actions, config.limit)
     if isinstance(config, MFStitchConfig):
         pairs = {pair: row for row, pair in enumerate(skill_pairs(len(benchmark.skills)))}
-        return MFStitch(models["mf-policy"], pairs, benchmark.actions, config.limit)
+        return MFStitch(models["mf-policy"], pairs, config.limit)
     if isinstance(config, MBStitchConfig):
         dynamics: Dynamics = models["dynamics"]
         planner = config.cem if config.planner == "cem" else config.random_shooting

@@ -6,13 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
-from orchestrator.builders import BLOCK_CODE
+from orchestrator.builders import BLOCK_CODE, KITS, SETUP_CODE
 from orchestrator.jobs import BlockTask
 from orchestrator.methods import METHODS, MFStitchConfig, method_name
 from orchestrator.recipes import Recipe, code_fingerprint, digest
 from orchestrator.spec import Spec
 from orchestrator.structure import Plain, to_plain
-from stitching.envs.registry import DATASETS
 
 Prefix = tuple[str, ...]
 
@@ -69,6 +68,11 @@ class Plan:
                 following.setdefault(node.parent, []).append(node)
         return following
 
+    @property
+    def needed(self) -> set[str]:
+        """Artifacts that the numbers depend on: all but the showcase."""
+        return set(self.recipes) - {self.showcase}
+
     def roots(self) -> Iterator[Node]:
         return (node for node in self.nodes if node.parent is None)
 
@@ -99,7 +103,7 @@ class Plan:
             "artifacts": artifacts,
             "configs": {kind: to_plain(spec.dynamics) for kind in artifacts if kind == "dynamics"},
         }
-        key = digest(content | {"code": code_fingerprint(*BLOCK_CODE)})
+        key = digest(content | {"code": code_fingerprint(BLOCK_CODE, SETUP_CODE)})
         return BlockTask(key=key, **content)
 
 
@@ -114,7 +118,8 @@ def make_plan(spec: Spec) -> Plan:
 
     root = {"root_seed": spec.root_seed}
     data = {"config": to_plain(spec.data), **root}
-    datasets = {name: add(name, data) for name in DATASETS[spec.benchmark]}
+    kit = KITS[spec.benchmark]
+    datasets = {role: add(kind, data) for role, kind in kit.datasets.items()}
     demonstrations = {"demonstrations": datasets["demonstrations"]}
     seeds = range(spec.seeds)
     agents = {
@@ -133,30 +138,27 @@ def make_plan(spec: Spec) -> Plan:
                 params = {"config": to_plain(config.training), "seed": seed, **root}
                 mf_policies[seed, method] = add("mf-policy", params, demonstrations)
     showcase = None
-    if spec.benchmark == "maze" and "dynamics" in needed:
-        showcase = add(*_showcase(spec, agents[0], dynamics[0], demonstrations))
+    if kit.showcase is not None and "dynamics" in needed:
+        params = _shown(spec, kit.shown_task)
+        models = {"agent": agents[0], "dynamics": dynamics[0]}
+        showcase = add(kit.showcase, params, models | demonstrations)
     return Plan(
         spec, recipes, agents, dynamics, mf_policies, datasets, showcase, tuple(_nodes(spec))
     )
 
 
-def _showcase(
-    spec: Spec, agent: str, dynamics: str, demonstrations: dict[str, str]
-) -> tuple[str, Plain, dict[str, str]]:
-    """Figure 1's task, by direct chaining and by MB-Stitch."""
+def _shown(spec: Spec, task: tuple[str, ...]) -> Plain:
+    """What a showcase records: one task by direct chaining and by MB-Stitch."""
     shown = [m for m in spec.methods if method_name(m) in ("no-stitch", "mb-stitch")]
-    longest = max(spec.all_tasks, key=len)
-    figure1 = ("g0", "g1", "g3", "g2")
-    params = {
+    return {
         "methods": {method: to_plain(spec.method_config(method)) for method in shown},
         "configs": {"dynamics": to_plain(spec.dynamics)},
         "rollout": to_plain(spec.rollout),
-        "task": figure1 if figure1 in spec.all_tasks else longest,
+        "task": task if task in spec.all_tasks else max(spec.all_tasks, key=len),
         "step_limit": spec.step_limit,
         "root_seed": spec.root_seed,
         "seed": 0,
     }
-    return "showcase", params, {"agent": agent, "dynamics": dynamics, **demonstrations}
 
 
 def _nodes(spec: Spec) -> list[Node]:

@@ -9,7 +9,7 @@ import subprocess
 from datetime import UTC, datetime
 from pathlib import Path
 
-from orchestrator.builders import BLOCK_CODE, BUILDERS
+from orchestrator.builders import BLOCK_CODE, BUILDERS, SETUP_CODE
 from orchestrator.recipes import NUMERIC_PACKAGES, code_fingerprint
 from orchestrator.structure import Plain
 
@@ -29,9 +29,11 @@ REPORTED_PACKAGES = (
 
 def matters() -> Plain:
     """What must not change under a run: a change may change its numbers."""
-    modules = sorted({builder.code for builder in BUILDERS.values()})
-    code = {f"code of {module}": code_fingerprint(module)[:12] for module in modules}
-    code[f"code of {BLOCK_CODE[0]}"] = code_fingerprint(*BLOCK_CODE)[:12]
+    parts = {kind: builder.code for kind, builder in BUILDERS.items()} | {"blocks": BLOCK_CODE}
+    code = {
+        f"code that makes {kind}": code_fingerprint(modules, SETUP_CODE)[:12]
+        for kind, modules in parts.items()
+    }
     packages = {name: importlib.metadata.version(name) for name in NUMERIC_PACKAGES}
     return code | packages
 

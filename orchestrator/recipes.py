@@ -6,15 +6,13 @@ import ast
 import hashlib
 import importlib.metadata
 import importlib.util
-import inspect
 import json
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from orchestrator.builders import BUILDERS
+from orchestrator.builders import BUILDERS, SETUP_CODE
 from orchestrator.structure import Plain
 
 METHOD_PACKAGE = "stitching"
@@ -41,33 +39,32 @@ class Recipe:
 
     @property
     def key(self) -> str:
-        builder = BUILDERS[self.kind]
         return digest(
             {
                 "kind": self.kind,
                 "params": self.params,
                 "inputs": self.inputs,
-                "code": [function_fingerprint(builder.make), code_fingerprint(builder.code)],
+                "code": code_fingerprint(BUILDERS[self.kind].code, SETUP_CODE),
             }
         )
 
 
 @cache
-def code_fingerprint(module: str, *beside: str) -> str:
-    """Hash of the syntax trees of a module and of every `stitching` module that it needs.
+def code_fingerprint(modules: tuple[str, ...], beside: tuple[str, ...] = ()) -> str:
+    """Hash of the syntax trees of some modules and of every `stitching` module that they need.
 
     Modules named `beside` are added without what they import. Comments, docstrings and formatting
     do not matter; any other change does, and so do the versions of the numeric packages. So an edit
     to a planner retrains nothing, and an edit to IQL retrains exactly what IQL made.
     """
-    trees = {name: _syntax(_tree(name)) for name in sorted(_closure(module) | set(beside))}
+    trees = {name: _syntax(_tree(name)) for name in sorted(_closure(modules) | set(beside))}
     packages = {name: importlib.metadata.version(name) for name in NUMERIC_PACKAGES}
     return digest({"modules": trees, "packages": packages})
 
 
-def _closure(module: str) -> set[str]:
+def _closure(modules: tuple[str, ...]) -> set[str]:
     seen: set[str] = set()
-    waiting = [module]
+    waiting = list(modules)
     while waiting:
         name = waiting.pop()
         if name not in seen:
@@ -111,11 +108,6 @@ def _syntax(tree: ast.Module) -> str:
         if isinstance(body, list) and body and _is_docstring(body[0]):
             body[:1] = [] if len(body) > 1 or isinstance(node, ast.Module) else [ast.Pass()]
     return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
-
-
-def function_fingerprint(function: Callable[..., Any]) -> str:
-    """Hash of one function's syntax tree, docstring apart."""
-    return _syntax(ast.parse(inspect.getsource(function)))
 
 
 def _is_docstring(node: Any) -> bool:

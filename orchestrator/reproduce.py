@@ -10,20 +10,27 @@ from analysis.episodes import write_episodes
 from analysis.report import build_report
 from orchestrator import tracking
 from orchestrator.building import Builds, verified_artifacts
-from orchestrator.errors import IncompleteError, SkillstitchError
+from orchestrator.errors import (
+    BadDataError,
+    IncompleteError,
+    LockedError,
+    SkillstitchError,
+    UsageError,
+)
 from orchestrator.evaluation import Evaluation
 from orchestrator.executors import ExecutorKind, open_executor
 from orchestrator.executors.protocol import Executor
 from orchestrator.exports import write_readable
 from orchestrator.jobs import Job, Report
 from orchestrator.ledger import Ledger
-from orchestrator.plan import make_plan
+from orchestrator.plan import Plan, make_plan
 from orchestrator.progress import Progress
 from orchestrator.provenance import provenance
 from orchestrator.rundir import RunDirectory
 from orchestrator.spec import Spec
 from orchestrator.stopwatch import Stopwatch
 from orchestrator.store import Artifact, Store, storage_errors
+from orchestrator.structure import Plain
 
 NO_TRACKING = "none"
 
@@ -38,6 +45,10 @@ class Settings:
     workers: int | None = None  # all cores, or all of the cluster's
     address: str | None = None  # of a Ray cluster
     tracking_uri: str | None = None  # SQLite beside the store; "none" turns tracking off
+
+    def __post_init__(self) -> None:
+        if self.workers is not None and self.workers < 1:
+            raise UsageError(f"--workers must be at least 1: {self.workers}")
 
     def resolved_tracking_uri(self) -> str:
         return self.tracking_uri or tracking.default_uri(self.store.parent)
@@ -114,54 +125,79 @@ def _carry_out(
     """Build and play whatever is missing, and write it up; False where nothing was missing."""
     plan = make_plan(spec)
     store, ledger = Store(settings.store), directory.ledger()
-    shared = Ledger(settings.store / "blocks.sqlite")
     present = verified_artifacts(plan, store, ledger, progress)
-    if directory.finished and present == set(plan.recipes):
-        return False
-    directory.mark(finished=False)
-    directory.write_json("provenance.json", provenance() | {"run_id": run_id})
-    executor = LazyExecutor(settings)
-    try:
-        watch.lap("preparing")
-        if present != set(plan.recipes):
-            executor.open()
-        watch.lap("starting workers")
-        announcement = _announce(directory, settings.resolved_tracking_uri())
-        builds = Builds(plan, store, ledger, executor, progress)
-        busy_training = builds.run(present)
-        watch.lap("training")
-        evaluation = Evaluation(plan, store, ledger, shared, executor, progress)
-        evaluation.run()
-        watch.lap("evaluation")
-    finally:
-        executor.close()
-    announcement.join()
-    watch.lap("stopping workers")
+    if directory.played and present >= plan.needed:
+        if directory.finished:
+            return False
+    else:
+        directory.mark(finished=False)
+        facts: Plain = {"run_id": run_id}
+        directory.write_json("provenance.json", provenance() | facts)
+        facts |= _work(plan, settings, directory, store, ledger, present, progress, watch)
+        with storage_errors(directory.path):
+            counts = write_readable(plan, store, ledger, directory)
+            episodes = write_episodes(directory.path)
+            counts["episodes"] = len(episodes)
+            counts["environment steps without the tree"] = int(episodes["steps"].sum())
+            watch.lap("writing")
+            facts |= {"seconds": watch.rounded(), "counts": counts}
+            directory.write_json("provenance.json", provenance() | facts)
     with storage_errors(directory.path):
-        counts = write_readable(plan, store, ledger, directory)
-        episodes = write_episodes(directory.path)
-        counts["episodes"] = len(episodes)
-        counts["environment steps without the tree"] = int(episodes["steps"].sum())
-        watch.lap("writing")
-        directory.write_json(
-            "provenance.json",
-            provenance()
-            | {
-                "run_id": run_id,
-                "executor": settings.executor,
-                "workers": executor.opened.workers if executor.opened else 0,
-                "seconds": watch.rounded(),
-                "busy worker seconds": {
-                    "training": round(busy_training, 1),
-                    "evaluation": round(evaluation.seconds, 1),
-                },
-                "counts": counts,
-            },
-        )
         build_report(directory.path)
     directory.mark(finished=True)
     watch.lap("report")
     return True
+
+
+def _work(
+    plan: Plan,
+    settings: Settings,
+    directory: RunDirectory,
+    store: Store,
+    ledger: Ledger,
+    present: set[str],
+    progress: Progress,
+    watch: Stopwatch,
+) -> Plain:
+    """Train and simulate; returns what the provenance tells of it."""
+    shared = Ledger(settings.store / "blocks.sqlite")
+    executor = LazyExecutor(settings)
+    watch.lap("preparing")
+    announcement = None
+    try:
+        if not present >= plan.needed:
+            executor.open()
+        watch.lap("starting workers")
+        announcement = _announce(directory, settings.resolved_tracking_uri())
+        builds = Builds(plan, store, ledger, executor, progress)
+        busy_training = builds.run(plan.needed, present)
+        watch.lap("training")
+        evaluation = Evaluation(plan, store, ledger, shared, executor, progress)
+        evaluation.run()
+        watch.lap("evaluation")
+        if plan.showcase is not None and plan.showcase not in present:
+            _build_showcase(builds, plan.showcase, plan.needed, progress)
+    finally:
+        executor.close()
+        if announcement is not None:
+            announcement.join()
+    watch.lap("stopping workers")
+    return {
+        "executor": settings.executor,
+        "workers": executor.opened.workers if executor.opened else 0,
+        "busy worker seconds": {
+            "training": round(busy_training, 1),
+            "evaluation": round(evaluation.seconds, 1),
+        },
+    }
+
+
+def _build_showcase(builds: Builds, key: str, present: set[str], progress: Progress) -> None:
+    """Last, and failing only costs the figure: it must not stand in the way of a number."""
+    try:
+        builds.run({key}, present, phase="showcase")
+    except (BadDataError, IncompleteError) as error:
+        progress.say(f"no showcase figure: {error}")
 
 
 def _announce(directory: RunDirectory, uri: str) -> threading.Thread:
@@ -185,8 +221,20 @@ def publish(
 
 
 def catch_up(directory: RunDirectory) -> str:
-    """Publish what an earlier command could not; cheap where nothing was missed."""
-    if not (directory.path / "tracking.json").is_file():
+    """Publish what an earlier command could not; cheap where nothing was missed.
+
+    A run under way is left to its own process.
+    """
+    receipt = directory.read_json("tracking.json")
+    if receipt is None:
         return ""
-    uri = directory.read_json("tracking.json")["uri"]
-    return publish(directory, uri, finished=directory.finished)
+    try:
+        with directory.locked():
+            return publish(
+                directory,
+                receipt["uri"],
+                finished=directory.played,
+                failed=receipt["status"] == "FAILED" and not directory.played,
+            )
+    except LockedError:
+        return ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import hashlib
 import json
 import os
 import socket
@@ -12,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import analysis
 from orchestrator.errors import ChangedError, LockedError, UsageError
 from orchestrator.ledger import Ledger
 from orchestrator.methods import method_label
@@ -19,6 +21,8 @@ from orchestrator.provenance import matters
 from orchestrator.spec import Spec, differences, spec_from_plain
 from orchestrator.store import storage_errors, write_atomically
 from orchestrator.structure import Plain, to_plain
+
+REPORT_SOURCES = (".py", ".csv", ".html", ".css", ".js")
 
 
 class RunDirectory:
@@ -38,17 +42,25 @@ class RunDirectory:
         self.path = path
 
     def ledger(self, *, read_only: bool = False) -> Ledger:
-        return Ledger(self.path / "ledger.sqlite", read_only=read_only)
+        path = self.path / "ledger.sqlite"
+        if read_only and not path.is_file():
+            raise UsageError(f"{self.path} has no ledger yet: nothing was played there")
+        return Ledger(path, read_only=read_only)
+
+    @property
+    def played(self) -> bool:
+        """Whether everything is played and written, with nothing given up."""
+        return (self.path / "finished").is_file() and not self.read_json("quarantine.json")
 
     @property
     def finished(self) -> bool:
-        """Whether everything is played and reported, with nothing given up."""
-        return (self.path / "finished").is_file() and not self.read_json("quarantine.json")
+        """Whether, moreover, the report is the one that today's analysis would write."""
+        return self.played and (self.path / "finished").read_text() == analysis_fingerprint()
 
     def mark(self, *, finished: bool) -> None:
         """Say that the readable files are complete, or that they are about to change."""
         if finished:
-            write_atomically(self.path / "finished", b"")
+            write_atomically(self.path / "finished", analysis_fingerprint().encode())
         else:
             (self.path / "finished").unlink(missing_ok=True)
 
@@ -119,6 +131,13 @@ class RunDirectory:
     def read_json(self, name: str) -> Any:
         path = self.path / name
         return json.loads(path.read_text()) if path.is_file() else None
+
+
+def analysis_fingerprint() -> str:
+    """Hash of everything that turns a ledger into a report."""
+    package = Path(analysis.__file__).parent
+    files = sorted(path for path in package.rglob("*") if path.suffix in REPORT_SOURCES)
+    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()
 
 
 def describe(spec: Spec) -> Plain:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from dataclasses import dataclass, field
 from importlib import resources
@@ -11,6 +12,8 @@ from typing import Any, Literal
 
 import tyro
 
+from analysis.rows import ROW_RULES
+from orchestrator.builders import KITS
 from orchestrator.errors import UsageError
 from orchestrator.methods import (
     METHODS,
@@ -18,6 +21,7 @@ from orchestrator.methods import (
     MethodConfig,
     MFStitchConfig,
     RandomStitchConfig,
+    method_name,
     parse_method,
 )
 from orchestrator.structure import Plain, structure, to_plain
@@ -28,7 +32,8 @@ from stitching.models.iql import IQLConfig
 from stitching.rollout import RolloutConfig
 
 Scale = Literal["smoke", "quick", "paper"]
-DataConfig = MazeDataConfig
+DataConfig = MazeDataConfig  # of any benchmark; `KITS` says whose is which
+NAME = re.compile(r"[A-Za-z0-9][\w.-]*")  # becomes part of paths
 
 
 @dataclass(frozen=True)
@@ -68,25 +73,7 @@ class Spec:
     tables: tuple[TableSpec, ...] = ()
 
     def __post_init__(self) -> None:
-        names = self.skill_names
-        for task in self.all_tasks:
-            if unknown := [skill for skill in task if skill not in names]:
-                raise UsageError(
-                    f"spec {self.name}, tasks: {self.benchmark} has no skill {unknown[0]!r}; "
-                    f"it has {', '.join(names)}"
-                )
-            if len(task) not in self.step_limits:
-                raise UsageError(
-                    f"spec {self.name}, step_limits: none for tasks of {len(task)} skills; "
-                    f"add step_limits.{len(task)}"
-                )
-        if not self.all_tasks:
-            raise UsageError(f"spec {self.name}: no tasks; set lengths or tasks")
-        for count in ("seeds", "episodes", "block_episodes"):
-            if getattr(self, count) < 1:
-                raise UsageError(f"spec {self.name}, {count}: must be at least 1")
-        for method in self.methods:
-            self.method_config(method)
+        check_spec(self)
 
     @property
     def skill_names(self) -> list[str]:
@@ -116,6 +103,70 @@ class Spec:
         return structure(METHODS[name].config, settings[name] | overrides, f"method {method}")
 
 
+def check_spec(spec: Spec) -> None:
+    """Refuse what could not be carried out, before anything runs; UsageError says what is valid."""
+    where = f"spec {spec.name}"
+    if spec.benchmark not in BENCHMARKS:
+        known = ", ".join(BENCHMARKS)
+        raise UsageError(f"{where}: unknown benchmark {spec.benchmark!r}; there are {known}")
+    for name in (spec.name, *(table.id for table in spec.tables)):
+        if not NAME.fullmatch(name):
+            raise UsageError(f"{where}: {name!r} is no name; use letters, digits, '.', '_' and '-'")
+    _check_tasks(spec, where)
+    for count in ("seeds", "episodes", "block_episodes"):
+        if getattr(spec, count) < 1:
+            raise UsageError(f"{where}, {count}: must be at least 1")
+    _check_methods(spec, where)
+    ids = [table.id for table in spec.tables]
+    for table in spec.tables:
+        if table.rows not in ROW_RULES:
+            rules = ", ".join(ROW_RULES)
+            raise UsageError(
+                f"{where}, table {table.id}: no rows {table.rows!r}; there are {rules}"
+            )
+        if ids.count(table.id) > 1:
+            raise UsageError(f"{where}: two tables have the id {table.id!r}")
+
+
+def _check_tasks(spec: Spec, where: str) -> None:
+    names = spec.skill_names
+    for length in spec.lengths:
+        if not 1 <= length <= len(names):
+            raise UsageError(
+                f"{where}, lengths: no tasks of {length}: {spec.benchmark} has {len(names)} skills"
+            )
+    if not spec.all_tasks:
+        raise UsageError(f"{where}: no tasks; set lengths or tasks")
+    for task in spec.all_tasks:
+        if unknown := [skill for skill in task if skill not in names]:
+            raise UsageError(
+                f"{where}, tasks: {spec.benchmark} has no skill {unknown[0]!r}; "
+                f"it has {', '.join(names)}"
+            )
+        if len(task) not in spec.step_limits:
+            raise UsageError(
+                f"{where}, step_limits: none for tasks of {len(task)} skills; "
+                f"add step_limits.{len(task)}"
+            )
+
+
+def _check_methods(spec: Spec, where: str) -> None:
+    if not spec.methods:
+        raise UsageError(f"{where}: no methods; there are {', '.join(METHODS)}")
+    seen: dict[tuple[str, str], str] = {}
+    for method in spec.methods:
+        config = spec.method_config(method)
+        same = seen.setdefault((method_name(method), str(config)), method)
+        if same != method or spec.methods.count(method) > 1:
+            raise UsageError(f"{where}, methods: {same} and {method} are the same method")
+        discrete = BENCHMARKS[spec.benchmark].actions.discrete
+        if isinstance(config, MBStitchConfig) and config.planner == "cem" and discrete:
+            raise UsageError(
+                f"{where}, {method}: cem plans continuous actions, {spec.benchmark} has discrete "
+                "ones; set planner to random-shooting"
+            )
+
+
 def packaged_specs() -> list[str]:
     return sorted(
         entry.name.removesuffix(".toml")
@@ -143,7 +194,7 @@ def load_spec(name_or_file: str, scale: Scale = "paper") -> Spec:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise UsageError(f"{where}: not valid TOML: {error}") from error
-    scales = content.pop("scales", {"paper": {}})
+    scales = {"paper": {}} | content.pop("scales", {})
     if scale not in scales:
         raise UsageError(f"{where}: no scale {scale!r}; it has {', '.join(scales)}")
     return spec_from_plain(_merged(content, scales[scale]) | {"scale": scale}, where)
@@ -156,7 +207,8 @@ def spec_from_plain(content: Plain, where: str) -> Spec:
         raise UsageError(
             f"{where}: unknown benchmark {benchmark!r}; there are {', '.join(BENCHMARKS)}"
         )
-    return structure(Spec, {"data": {}} | content, where)
+    data = structure(KITS[benchmark].data, content.get("data", {}), f"{where}, data")
+    return structure(Spec, content | {"data": data}, where)
 
 
 def differences(old: Spec, new: Spec) -> list[str]:

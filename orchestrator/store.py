@@ -21,13 +21,13 @@ from safetensors import SafetensorError
 from safetensors.numpy import load as load_safetensors
 from safetensors.numpy import save as save_safetensors
 
-from orchestrator.errors import StorageError
+from orchestrator.errors import IncompleteError, StorageError
 
 Arrays = dict[str, np.ndarray]
 
 
-class CorruptArtifactError(Exception):
-    """An artifact's bytes are not those that were written; it must be rebuilt."""
+class CorruptArtifactError(IncompleteError):
+    """An artifact's bytes are not those that were written; the next command rebuilds it."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +73,8 @@ class Store:
         `made` records how the artifact came to be (recipe, seconds); it is no part of the digest.
         Raises StorageError when the disk is full; nothing half-written stays visible.
         """
+        if self._holds(kind, key, artifact):  # another run over this store was faster
+            return artifact.digest
         final = self.path(kind, key)
         temporary = self.root / "incoming" / f"{key}-{uuid.uuid4().hex}"
         files = artifact.files()
@@ -94,6 +96,12 @@ class Store:
             finally:
                 shutil.rmtree(temporary, ignore_errors=True)
         return artifact.digest
+
+    def _holds(self, kind: str, key: str, artifact: Artifact) -> bool:
+        try:
+            return self.read(kind, key).digest == artifact.digest
+        except CorruptArtifactError:
+            return False
 
     def read(self, kind: str, key: str) -> Artifact:
         """The artifact, every file's digest checked before any of it is used.
@@ -128,7 +136,8 @@ class Store:
         aside = self.root / "corrupt" / f"{kind}-{key}-{uuid.uuid4().hex[:8]}"
         with storage_errors(self.root):
             aside.parent.mkdir(parents=True, exist_ok=True)
-            self.path(kind, key).rename(aside)
+            with suppress(FileNotFoundError):  # another run over this store was faster
+                self.path(kind, key).rename(aside)
         return aside
 
     def artifacts(self) -> Iterator[tuple[str, str]]:

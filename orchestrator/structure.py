@@ -39,6 +39,8 @@ def _value(hint: Any, value: Any, where: str) -> Any:
     if origin in (Union, types.UnionType):
         return _first_fitting(args, value, where)
     if is_dataclass(hint):
+        if isinstance(value, hint):  # type: ignore[arg-type]
+            return value
         return structure(hint, value, where)  # type: ignore[arg-type]
     if origin is Literal:
         if value not in args:

@@ -50,7 +50,8 @@ def maze_showcase(
     episodes = []
     for method, stitcher in stitchers.items():
         recorder = PathRecorder(maze)
-        play = Play(root_seed, maze.name, seed, method, (0,), task)
+        name, _, _ = method.partition("[")  # streams know no settings
+        play = Play(root_seed, maze.name, seed, name, (0,), task)
         segments = play_from_start(
             maze.block(), agent, stitcher, maze, config, play, step_limit, recorder
         )

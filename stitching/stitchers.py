@@ -73,11 +73,10 @@ class RandomStitch:
 
 @dataclass(frozen=True)
 class MFStitch:
-    """An extra policy learned from the mixed data of both skills; conditioned on the pair."""
+    """The mode of an extra policy learned from the mixed data; conditioned on the pair."""
 
     policy: Agent
     pairs: dict[tuple[int, int], int]  # (previous, following) → the policy's condition
-    actions: ActionSpace
     limit: int
 
     def propose(
@@ -87,8 +86,7 @@ class MFStitch:
         following: int,
         streams: Sequence[np.random.Generator],
     ) -> np.ndarray:
-        noise = policy_noise(self.actions, streams)
-        return self.policy.act(states, self.pairs[previous, following], noise)[:, None]
+        return self.policy.act(states, self.pairs[previous, following], noise=None)[:, None]
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ def stream(*labels: Label) -> np.random.Generator:
     # Length-prefixed, so that ("ab", "c") and ("a", "bc") name different streams.
     digest = hashlib.blake2b(digest_size=16)
     for label in labels:
-        text = f"{type(label).__name__}:{label}".encode()
+        kind = "str" if isinstance(label, str) else "int"  # numpy's integers are integers
+        text = f"{kind}:{label}".encode()
         digest.update(len(text).to_bytes(4, "little") + text)
     return np.random.Generator(np.random.Philox(key=int.from_bytes(digest.digest(), "little")))

@@ -1,9 +1,8 @@
-"""Offline data: flat columns of transitions with episode boundaries, kept as memory-mapped .npy."""
+"""Offline data: flat columns of transitions with episode boundaries, kept as .npy files."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from pathlib import Path
 
 import numpy as np
 
@@ -43,16 +42,6 @@ class Transitions:
         chosen = np.flatnonzero(self.episode_skills == skill)
         starts = self.episode_starts
         return [np.arange(starts[e], self.episode_ends[e]) for e in chosen]
-
-
-def load(folder: Path) -> Transitions:
-    """Memory-map a dataset; pickled arrays are refused, whatever their file name."""
-    return Transitions(
-        **{
-            field.name: np.load(folder / f"{field.name}.npy", mmap_mode="r", allow_pickle=False)
-            for field in fields(Transitions)
-        }
-    )
 
 
 def concatenate(parts: list[Transitions]) -> Transitions:

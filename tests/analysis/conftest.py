@@ -190,7 +190,11 @@ def write_run(segments: pd.DataFrame) -> Callable[..., Path]:
         run_dir.mkdir(parents=True)
         contents = {
             "spec": make_spec(),
-            "provenance": {"versions": {"python": "3.11"}, "timings": {"rollout": 12.5}},
+            "provenance": {
+                "versions": {"python": "3.11"},
+                "seconds": {"training": 20.5, "evaluation": 12.5},
+                "busy worker seconds": {"training": 38.1, "evaluation": 24.0},
+            },
             "training": make_training(),
             "showcase": make_showcase(),
             **files,

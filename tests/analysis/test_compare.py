@@ -16,7 +16,7 @@ def test_a_run_equals_itself(run_a: Path) -> None:
     comparison = compare(run_a, run_a)
     assert comparison.columns.tolist() == COLUMNS
     assert len(comparison) == 12
-    assert (comparison[["difference", "ci_low", "ci_high"]] == 0).all(axis=None)
+    assert (comparison[["b_minus_a", "ci_low", "ci_high"]] == 0).all(axis=None)
     assert comparison["pairs"].tolist() == [360] * 4 + [720] * 8
 
 
@@ -28,9 +28,13 @@ def test_a_difference_is_found_and_paired(
     run_b = write_run(tmp_path / "b", segments=worse)
     comparison = compare(run_a, run_b).set_index(["row", "method"])
     assert comparison.loc[("2 goals", "mb-stitch"), "score_b"] == 0.5
-    assert comparison.loc[("2 goals", "mb-stitch"), "ci_low"] > 0.4
-    assert comparison.loc[("2 goals", "no-stitch"), "difference"] == 0
+    changed = comparison.loc[("2 goals", "mb-stitch")]
+    assert changed["b_minus_a"] == pytest.approx(changed["score_b"] - changed["score_a"])
+    assert changed["ci_high"] < -0.4
+    assert comparison.loc[("2 goals", "no-stitch"), "b_minus_a"] == 0
     text = comparison_markdown(comparison.reset_index(), "a", "b")
+    assert "| A: a | B: b | B − A |" in text
+    assert f"| 0.500 | {changed['b_minus_a']:+.3f} |" in text
     assert sum(line.endswith("| apart |") for line in text.splitlines()) == 3
 
 
@@ -65,3 +69,13 @@ def test_an_unfinished_run_has_nothing_yet(
     run_b = write_run(tmp_path / "b", segments=segments.query("depth == 1"))
     with pytest.raises(NothingToCompareError, match="resume the one that is incomplete"):
         compare(run_a, run_b)
+
+
+def test_what_one_run_gave_up_is_compared_in_neither(
+    run_a: Path, tmp_path: Path, segments: pd.DataFrame, write_run: Any
+) -> None:
+    block = {"method": "mb-stitch", "seed": 0, "prefix": "g0>g1", "episodes": [0, 1, 2]}
+    run_b = write_run(tmp_path / "b", quarantine=[block])
+    pairs = compare(run_a, run_b).set_index(["row", "method"])["pairs"]
+    assert pairs["2 goals", "mb-stitch"] == pairs["2 goals", "no-stitch"] - 3
+    assert pairs["4 goals", "mb-stitch"] == pairs["4 goals", "no-stitch"] - 2 * 3

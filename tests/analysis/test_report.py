@@ -5,6 +5,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
+from analysis import report
 from analysis.report import build_report, export_results
 
 
@@ -64,10 +65,32 @@ def test_a_partial_run_is_reported_as_such(tmp_path: Path, segments: Any, write_
         tmp_path / "run", segments=lost, quarantine=[block], training=None, showcase=None
     )
     page = build_report(run_dir).read_text(encoding="utf-8")
+    assert "without any of the block's episodes" in page
     assert "Partial table: 7,150 of 7,200 episodes" in page
     assert "planner &lt;diverged&gt; &amp; stopped" in page
     assert "n = 350 of 360" in page
     assert not (run_dir / "report" / "figures" / "curves.svg").exists()
+
+
+def test_the_old_results_stay_until_the_new_are_whole(
+    tmp_path: Path, write_run: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run_dir = write_run(tmp_path / "run", training=None, showcase=None)
+    export_results(run_dir, tmp_path / "results")
+    (tmp_path / "results" / "table1" / "stale.txt").touch()
+    before = contents(tmp_path)
+
+    def interrupted(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    for last_step in ("render_page", "_copy_table"):
+        with monkeypatch.context() as patch:
+            patch.setattr(report, last_step, interrupted)
+            with pytest.raises(KeyboardInterrupt):
+                export_results(run_dir, tmp_path / "results")
+        assert contents(tmp_path) == before
+    export_results(run_dir, tmp_path / "results")
+    assert before.keys() - contents(tmp_path).keys() == {"results/table1/stale.txt"}
 
 
 def test_a_run_that_has_only_begun_can_be_reported(

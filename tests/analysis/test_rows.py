@@ -1,8 +1,10 @@
+import subprocess
+import sys
 from dataclasses import replace
 
 import pytest
 
-from analysis.rows import column_labels, place_tasks
+from analysis.rows import ROW_RULES, check_tables, column_labels, place_tasks
 from analysis.run import RunError, RunSpec, TableEntry
 
 
@@ -49,3 +51,19 @@ def test_by_variant_names_the_method_without_it(spec: RunSpec) -> None:
 def test_an_unknown_rule_names_the_known_ones(spec: RunSpec) -> None:
     with pytest.raises(RunError, match="known are length, last_skill, task, variant"):
         rows_of(spec, "colour")
+
+
+def test_tables_can_be_checked_before_anything_is_run() -> None:
+    good = [TableEntry(id=rule, paper="", rows=rule, title="") for rule in ROW_RULES]
+    check_tables(good)
+    bad = TableEntry(id="mine", paper="", rows="colour", title="")
+    with pytest.raises(RunError, match="table mine wants rows by 'colour'; known are length, last"):
+        check_tables([*good, bad])
+
+
+def test_the_check_costs_no_heavy_import() -> None:
+    code = "import sys, analysis.rows; print(*{'numpy', 'pandas', 'matplotlib'} & set(sys.modules))"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert not loaded.stdout.strip()

@@ -10,12 +10,14 @@ from analysis.run import RunSpec
 from analysis.tables import Table, build_table
 from analysis.verdicts import (
     AGREES,
+    EXPLANATION,
     FAILS,
     HIGHER,
     HOLDS,
     LOWER,
     NO_DATA,
     NOT_PRINTED,
+    SAME_SKILLS,
     UNDECIDED,
     cell_verdict,
     claims,
@@ -65,6 +67,12 @@ def test_constant_skills_fail_when_they_grow(table: Table) -> None:
     scores = table.scores.copy()
     scores.loc[scores["method"] == "no-stitch", "score"] = 0.5
     assert claims(replace(table, scores=scores))[-1].verdict == FAILS
+
+
+def test_the_claim_judged_without_an_interval_is_named() -> None:
+    assert (
+        f"without an interval: it “{HOLDS}” if our numbers lie within {SAME_SKILLS}" in EXPLANATION
+    )
 
 
 def test_table_2_does_not_claim_constant_skills(table: Table) -> None:

@@ -42,12 +42,10 @@ def test_a_worker_lost_while_training(
 ) -> None:
     place.out.mkdir()
     ledger, lines = place.directory.ledger(), Lines()
-    Builds(plan, place.store, ledger, ForgetfulBuilder(2), lines).run(set())
-    for key, recipe in plan.recipes.items():
-        assert (
-            place.store.read(recipe.kind, key).digest
-            == finished.store.read(recipe.kind, key).digest
-        )
+    Builds(plan, place.store, ledger, ForgetfulBuilder(2), lines).run(plan.needed, set())
+    for key in plan.needed:
+        kind = plan.recipes[key].kind
+        assert place.store.read(kind, key).digest == finished.store.read(kind, key).digest
     assert "building agent again: the worker died" in lines.text
 
 
@@ -57,7 +55,7 @@ def test_an_artifact_that_cannot_be_built(spec: Spec, plan: Plan, place: Place) 
         plan, place.store, place.directory.ledger(), ForgetfulBuilder(ATTEMPTS), Silent()
     )
     with pytest.raises(IncompleteError, match=r"building agent \w+ failed 3 times.*\n.*died"):
-        builds.run(set())
+        builds.run(plan.needed, set())
 
 
 def test_a_damaged_artifact_is_named_set_aside_and_rebuilt(
@@ -142,16 +140,16 @@ def test_unusable_data_is_refused_before_training(
     complaint: str,
 ) -> None:
     key = plan.datasets["demonstrations"]
-    real = finished.store.read("demonstrations", key)
+    real = finished.store.read("maze-demonstrations", key)
     arrays = real.arrays | {column: np.ascontiguousarray(spoil(real.arrays[column]))}
-    place.store.write("demonstrations", key, Artifact(arrays, real.info), {"kind": "x"})
+    place.store.write("maze-demonstrations", key, Artifact(arrays, real.info), {"kind": "x"})
 
     def untouched(*_: object) -> None:
         raise AssertionError("something was trained on it")
 
     for name in ("train_iql", "train_dynamics"):
         monkeypatch.setattr(f"orchestrator.builders.{name}", untouched)
-    folder = place.store.path("demonstrations", key)
+    folder = place.store.path("maze-demonstrations", key)
     with pytest.raises(BadDataError, match=rf"{folder}/{complaint}") as caught:
         place.carry_out(spec)
     assert caught.value.exit_code == 7

@@ -5,7 +5,9 @@ from itertools import permutations
 
 import pytest
 
+from orchestrator.builders import BLOCK_CODE, SETUP_CODE
 from orchestrator.plan import Node, Plan, make_plan
+from orchestrator.recipes import _closure
 from orchestrator.spec import Spec, load_spec
 
 
@@ -52,12 +54,12 @@ def test_parents_come_first(plan: Plan) -> None:
 def test_artifacts_come_after_their_inputs(plan: Plan) -> None:
     kinds = [recipe.kind for recipe in plan.recipes.values()]
     assert {kind: kinds.count(kind) for kind in set(kinds)} == {
-        "demonstrations": 1,
-        "exploration": 1,
+        "maze-demonstrations": 1,
+        "maze-exploration": 1,
         "agent": 3,
         "dynamics": 3,
         "mf-policy": 3,
-        "showcase": 1,
+        "maze-showcase": 1,
     }
     seen: set[str] = set()
     for key, recipe in plan.recipes.items():
@@ -82,7 +84,7 @@ def test_alpha_touches_only_mb_stitch_after_the_first_skill(plan: Plan, spec: Sp
     other = make_plan(replace(spec, mb_stitch=replace(spec.mb_stitch, alpha=5.0)))
     assert changed(plan, other) == {node for node in plan.nodes if node.method == "mb-stitch"}
     differing = set(plan.recipes) - set(other.recipes)
-    assert {plan.recipes[key].kind for key in differing} == {"showcase"}
+    assert {plan.recipes[key].kind for key in differing} == {"maze-showcase"}
 
 
 def test_the_dynamics_touch_only_what_plans_with_them(plan: Plan, spec: Spec) -> None:
@@ -100,6 +102,11 @@ def test_more_seeds_methods_or_tasks_touch_nothing(plan: Plan, spec: Spec) -> No
     theirs = block_keys(plan)
     assert all(theirs[place] == key for place, key in block_keys(fewer).items())
     assert set(fewer.recipes) - {fewer.showcase} < set(plan.recipes)  # it shows other methods
+
+
+@pytest.mark.parametrize("module", [*BLOCK_CODE, *SETUP_CODE, "stitching.planning.objective"])
+def test_blocks_are_named_by_the_code_that_plays_them(module: str) -> None:
+    assert module in _closure(BLOCK_CODE) | set(SETUP_CODE)
 
 
 def test_settings_in_a_methods_name_are_settings(spec: Spec) -> None:

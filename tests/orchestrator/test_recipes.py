@@ -41,7 +41,7 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Write]:
 
 
 def fingerprint() -> str:
-    return code_fingerprint("method_under_test.top")
+    return code_fingerprint(("method_under_test.top",))
 
 
 def test_comments_docstrings_and_layout_do_not_matter(write: Write) -> None:

@@ -21,8 +21,9 @@ def test_everything_is_done_once(spec: Spec, plan: Plan, place: Place, counted: 
     assert set(counted.played.values()) == {1}
     assert set(counted.played) == place.finished_blocks() <= {t.key for t in plan.tasks.values()}
     assert lines.phases == {
-        "training": (len(plan.recipes), 0),
+        "training": (len(plan.needed), 0),
         "evaluation": (len(plan.tasks), 0),
+        "showcase": (1, 0),
     }
     assert directory.finished
     segments = pd.read_parquet(directory.path / "segments.parquet")

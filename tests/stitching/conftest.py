@@ -77,7 +77,7 @@ def stitchers(
     return {
         "no-stitch": NoStitch(),
         "random-stitch": RandomStitch(maze.actions, limit=5),
-        "mf-stitch": MFStitch(mf_policy, pairs, maze.actions, limit=5),
+        "mf-stitch": MFStitch(mf_policy, pairs, limit=5),
         "mb-stitch": MBStitch(*planning, execute=4, limit=5),
         "mb-stitch[execute=1]": MBStitch(*planning, execute=1, limit=5),
     }

@@ -110,7 +110,7 @@ def test_is_what_the_evaluation_would_have_played(
 ) -> None:
     for episode in scene["episodes"]:
         method = episode["method"]
-        play = Play(0, "maze", 1, method, (0,), TASK)
+        play = Play(0, "maze", 1, method.partition("[")[0], (0,), TASK)
         played = play_from_start(
             maze.block(), agent, stitchers[method], maze, CONFIG, play, STEP_LIMIT
         )

@@ -30,6 +30,7 @@ from stitching.streams import stream
 
 MOVES, ARM = ActionSpace(4, discrete=True), ActionSpace(2, discrete=False)
 PROPOSERS = ["random-stitch", "mf-stitch", "mb-stitch", "mb-stitch[execute=1]"]
+DRAWING = ["random-stitch", "mb-stitch"]  # those that leave something to chance
 
 
 def streams(n: int, use: str = "stitch") -> list[np.random.Generator]:
@@ -71,7 +72,7 @@ def test_a_proposal_belongs_to_its_stream_and_state(
         assert np.array_equal(alone[0], together[row])
 
 
-@pytest.mark.parametrize("method", PROPOSERS)
+@pytest.mark.parametrize("method", DRAWING)
 def test_other_streams_bring_other_proposals(
     method: str, stitchers: dict[str, Stitcher], states: torch.Tensor
 ) -> None:
@@ -80,7 +81,7 @@ def test_other_streams_bring_other_proposals(
     assert len(np.unique(proposals, axis=0)) > 1
 
 
-@pytest.mark.parametrize("method", PROPOSERS)
+@pytest.mark.parametrize("method", DRAWING)
 def test_streams_go_on_from_call_to_call(
     method: str, stitchers: dict[str, Stitcher], states: torch.Tensor
 ) -> None:
@@ -140,18 +141,18 @@ def test_mf_stitch_asks_its_policy_about_the_ordered_pair() -> None:
     towards = np.concatenate([np.zeros((6, 4)), -50 * np.eye(4), 50 * np.eye(4)])
     policy = linear_agent(np.zeros((1, 14)), towards, conditions, MOVES)
     pairs = {pair: row for row, pair in enumerate(skill_pairs(4))}
-    stitcher = MFStitch(policy, pairs, MOVES, limit=5)
+    stitcher = MFStitch(policy, pairs, limit=5)
     for previous, following in permutations(range(4), 2):
         actions = stitcher.propose(torch.zeros(10, 6), previous, following, streams(10))
         assert (actions.argmax(axis=2) == following).all()
 
 
-def test_mf_stitch_samples_its_policy() -> None:
-    logits = np.log([0.1, 0.2, 0.3, 0.4])
-    policy = linear_agent(np.zeros((1, 2)), np.stack([0 * logits, logits]), np.ones((1, 1)), MOVES)
-    stitcher = MFStitch(policy, {(0, 1): 0}, MOVES, limit=5)
-    actions = stitcher.propose(torch.zeros(4000, 1), 0, 1, streams(4000))
-    np.testing.assert_allclose(actions.mean(axis=(0, 1)), [0.1, 0.2, 0.3, 0.4], atol=0.03)
+def test_mf_stitch_plays_its_policys_mode() -> None:
+    likes = np.log([0.1, 0.2, 0.4, 0.3])
+    policy = linear_agent(np.zeros((1, 2)), np.stack([0 * likes, likes]), np.ones((1, 1)), MOVES)
+    stitcher = MFStitch(policy, {(0, 1): 0}, limit=5)
+    actions = stitcher.propose(torch.zeros(50, 1), 0, 1, streams(50))
+    assert (actions.argmax(axis=2) == 2).all()
 
 
 def test_policy_noise_is_each_streams_own() -> None:

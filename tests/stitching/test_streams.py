@@ -54,6 +54,11 @@ def test_lookalikes_are_told_apart(first: tuple[Label, ...], second: tuple[Label
     assert draws(*first) != draws(*second)
 
 
+def test_numbers_from_arrays_name_the_stream_of_the_number() -> None:
+    for episode in np.arange(3):
+        assert draws("policy", episode) == draws("policy", int(episode))
+
+
 def test_a_stream_does_not_disturb_another() -> None:
     alone = stream("a").random(4)
     a, b = stream("a"), stream("b")

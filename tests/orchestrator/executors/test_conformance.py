@@ -125,7 +125,7 @@ def test_a_build_that_fails(executor: Executor, plan: Plan) -> None:
 
 def test_a_build_on_bad_data(executor: Executor, plan: Plan, finished: Place) -> None:
     good = plan.recipes[plan.agents[0]]
-    real = finished.store.read("demonstrations", good.inputs["demonstrations"])
+    real = finished.store.read("maze-demonstrations", good.inputs["demonstrations"])
     observations = real.arrays["observations"].copy()
     observations[17, 2] = np.nan
     executor.provide("bad", Artifact(real.arrays | {"observations": observations}, real.info))

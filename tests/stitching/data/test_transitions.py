@@ -1,10 +1,7 @@
 """Datasets on disk: what is written comes back, and what must not be trained on is refused."""
 
-import os
-import pickle
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +12,6 @@ from stitching.data.transitions import (
     Transitions,
     check,
     concatenate,
-    load,
 )
 from stitching.envs.maze import MAZE
 
@@ -36,68 +32,11 @@ def dataset(lengths: tuple[int, ...] = (3, 1, 4), seed: int = 0) -> Transitions:
     )
 
 
-def save(data: Transitions, folder: Path) -> Path:
-    for name, column in data.columns().items():
-        np.save(folder / f"{name}.npy", column)
-    return folder
-
-
 def assert_same_bytes(actual: Transitions, expected: Transitions) -> None:
     for name, column in expected.columns().items():
         other = actual.columns()[name]
         assert (other.dtype, other.shape) == (column.dtype, column.shape), name
         assert other.tobytes() == column.tobytes(), name
-
-
-def test_what_is_saved_is_loaded_without_copying_it(tmp_path: Path) -> None:
-    data = dataset()
-    loaded = load(save(data, tmp_path))
-    assert_same_bytes(loaded, data)
-    for column in loaded.columns().values():
-        assert isinstance(column, np.memmap)
-        assert not column.flags.writeable
-    check(loaded, MAZE, str(tmp_path))
-
-
-def test_a_missing_file_is_named(tmp_path: Path) -> None:
-    (save(dataset(), tmp_path) / "actions.npy").unlink()
-    with pytest.raises(FileNotFoundError, match=r"actions\.npy"):
-        load(tmp_path)
-
-
-class Trap:
-    """Unpickling one creates a file."""
-
-    def __init__(self, bait: Path) -> None:
-        self.bait = bait
-
-    def __reduce__(self) -> tuple[Callable, tuple]:
-        return os.mkdir, (str(self.bait),)
-
-
-def as_object_array(file: Path, bait: Path) -> None:
-    np.save(file, np.array([Trap(bait)], dtype=object), allow_pickle=True)
-
-
-def as_bare_pickle(file: Path, bait: Path) -> None:
-    file.write_bytes(pickle.dumps(Trap(bait)))
-
-
-@pytest.mark.parametrize("write", [as_object_array, as_bare_pickle])
-@pytest.mark.parametrize("column", ["observations", "episode_skills"])
-def test_pickles_are_refused_and_nothing_in_them_runs(
-    tmp_path: Path, write: Callable[[Path, Path], None], column: str
-) -> None:
-    bait = tmp_path / "sprung"
-    file = save(dataset(), tmp_path) / f"{column}.npy"
-    write(file, bait)
-    with pytest.raises(ValueError, match=r"pickle|object|Python"):
-        load(tmp_path)
-    assert not bait.exists()
-
-    if write is as_object_array:  # the trap does work
-        np.load(file, allow_pickle=True)
-        assert bait.exists()
 
 
 def test_episodes_know_their_rows() -> None:

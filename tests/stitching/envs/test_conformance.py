@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from stitching.envs.protocol import Benchmark, EpisodeBlock, conditions
-from stitching.envs.registry import BENCHMARKS, DATASETS
+from stitching.envs.registry import BENCHMARKS
 from stitching.streams import stream
 
 EPISODES, STEPS = 3, 6
@@ -65,9 +65,8 @@ def midway(benchmark: Benchmark, use: str = "before") -> EpisodeBlock:
     return block
 
 
-def test_is_registered_under_its_own_name_with_its_datasets(benchmark: Benchmark) -> None:
+def test_is_registered_under_its_own_name(benchmark: Benchmark) -> None:
     assert BENCHMARKS[benchmark.name] is benchmark
-    assert "demonstrations" in DATASETS[benchmark.name]
 
 
 def test_skills_are_told_apart(benchmark: Benchmark) -> None:

@@ -33,11 +33,12 @@ def test_normalised_data_have_mean_0_and_deviation_1() -> None:
 
 def test_float32_sums_would_not_do() -> None:
     """A small spread around a large mean, in more rows than float32 can add up."""
-    observations = np.full((200_000, 1), 1000.0, dtype=np.float32)
+    observations = np.full((200_000, 2), 1000.0, dtype=np.float32)
     observations[::2] += 0.125
+    assert abs(observations.std(axis=0)[0] - 0.0625) > 1
     mean, std = observation_scale(observations)
-    assert mean[0] == pytest.approx(1000.0625, abs=1e-4)
-    assert std[0] == pytest.approx(0.0625, rel=1e-4)
+    assert mean.tolist() == pytest.approx([1000.0625] * 2, abs=1e-4)
+    assert std.tolist() == pytest.approx([0.0625] * 2, rel=1e-4)
 
 
 def test_constant_dimensions_keep_their_scale() -> None:

@@ -1,0 +1,91 @@
+"""Files and folders that are there whole or not at all, whenever the process is killed."""
+
+import ctypes
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+AT_FDCWD, RENAME_EXCHANGE = -100, 2  # of renameat2(2)
+
+
+@contextmanager
+def replaced_file(target: Path) -> Iterator[Path]:
+    """A path to write to, which becomes the target once the block is left without an error."""
+    draft = _draft(target)
+    try:
+        yield draft
+        _sync(draft)
+        draft.replace(target)
+        _sync(target.parent)
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+@contextmanager
+def replaced_folder(target: Path) -> Iterator[Path]:
+    """An empty folder to fill, which becomes the target once the block is left without an error.
+
+    Nothing of the old target stays.
+    """
+    target.parent.mkdir(parents=True, exist_ok=True)
+    draft = _draft(target)
+    draft.mkdir()
+    try:
+        yield draft
+        for path in (*draft.rglob("*"), draft):
+            _sync(path)
+        _put_in_place(draft, target)
+        _sync(target.parent)
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def _draft(target: Path) -> Path:
+    """A hidden sibling of this process's own; those of processes that were killed are removed."""
+    for left in target.parent.glob(f".{target.name}.*.tmp"):
+        process = left.name.split(".")[-2]
+        if process.isdigit() and not _alive(int(process)):
+            shutil.rmtree(left) if left.is_dir() else left.unlink()
+    return target.with_name(f".{target.name}.{os.getpid()}.tmp")
+
+
+def _alive(process: int) -> bool:
+    """Whether another process has this number."""
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:  # somebody else's
+        return True
+    return process != os.getpid()
+
+
+def _sync(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _put_in_place(draft: Path, target: Path) -> None:
+    """Afterwards the old target, if any, is at `draft`."""
+    if not target.exists():
+        draft.rename(target)
+    elif not _exchange(draft, target):
+        # Killed between the two renames, neither is there; what called builds it anew next time.
+        aside = draft.with_name(f".{target.name}.old.{os.getpid()}.tmp")
+        target.rename(aside)
+        draft.rename(target)
+        aside.rename(draft)
+
+
+def _exchange(first: Path, second: Path) -> bool:
+    """Swap two paths in one step; False where the system or the file system cannot."""
+    renameat2 = getattr(ctypes.CDLL(None), "renameat2", None)
+    if renameat2 is None:
+        return False
+    paths = os.fsencode(first), os.fsencode(second)
+    return bool(renameat2(AT_FDCWD, paths[0], AT_FDCWD, paths[1], RENAME_EXCHANGE) == 0)
