@@ -17,8 +17,8 @@ from orchestrator.executors import ExecutorKind
 from orchestrator.spec import Spec, load_spec, packaged_specs
 
 INTERRUPTED = 130
-ERRORS = Console(stderr=True, highlight=False)
-OUTPUT = Console(highlight=False)
+ERRORS = Console(stderr=True, highlight=False, soft_wrap=True)
+OUTPUT = Console(highlight=False, soft_wrap=True)
 
 OfSpec = Annotated[Spec, tyro.conf.arg(name="")]  # spec fields are options of the command itself
 
@@ -144,7 +144,7 @@ def _run(words: list[str]) -> None:
     if command.results is not None:
         _export(out, command.results)
     for line in summary_lines(RunDirectory(out)):
-        OUTPUT.print(line, markup=False, soft_wrap=True)
+        OUTPUT.print(line, markup=False)
     if incomplete is not None:
         raise incomplete
 
@@ -227,7 +227,7 @@ def _compare(words: list[str]) -> None:
         """
         with _clear_errors():
             text = comparison_markdown(compare(run_a, run_b), run_a.name, run_b.name)
-        OUTPUT.print(text, markup=False, soft_wrap=True)
+        OUTPUT.print(text, markup=False)
 
     tyro.cli(both, args=words, prog="skillstitch compare")
 
@@ -246,7 +246,7 @@ def _doctor(words: list[str]) -> None:
             OUTPUT.print(as_table(findings))
         else:
             for line in as_lines(findings):
-                OUTPUT.print(line, markup=False, soft_wrap=True)
+                OUTPUT.print(line, markup=False)
         if has_faults(findings):
             sys.exit(1)
 

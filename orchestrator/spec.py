@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from dataclasses import dataclass, field
@@ -112,6 +113,7 @@ def check_spec(spec: Spec) -> None:
     for name in (spec.name, *(table.id for table in spec.tables)):
         if not NAME.fullmatch(name):
             raise UsageError(f"{where}: {name!r} is no name; use letters, digits, '.', '_' and '-'")
+    _check_numbers(to_plain(spec), where)
     _check_tasks(spec, where)
     for count in ("seeds", "episodes", "block_episodes"):
         if getattr(spec, count) < 1:
@@ -126,6 +128,14 @@ def check_spec(spec: Spec) -> None:
             )
         if ids.count(table.id) > 1:
             raise UsageError(f"{where}: two tables have the id {table.id!r}")
+
+
+def _check_numbers(plain: Any, where: str) -> None:
+    if isinstance(plain, dict):
+        for name, value in plain.items():
+            _check_numbers(value, f"{where}, {name}")
+    elif isinstance(plain, float) and not math.isfinite(plain):
+        raise UsageError(f"{where}: {plain} is no finite number")
 
 
 def _check_tasks(spec: Spec, where: str) -> None:
@@ -148,6 +158,9 @@ def _check_tasks(spec: Spec, where: str) -> None:
                 f"{where}, step_limits: none for tasks of {len(task)} skills; "
                 f"add step_limits.{len(task)}"
             )
+    for length, limit in spec.step_limits.items():
+        if limit < 1:
+            raise UsageError(f"{where}, step_limits, {length}: must be at least 1")
 
 
 def _check_methods(spec: Spec, where: str) -> None:
@@ -156,6 +169,7 @@ def _check_methods(spec: Spec, where: str) -> None:
     seen: dict[tuple[str, str], str] = {}
     for method in spec.methods:
         config = spec.method_config(method)
+        _check_numbers(to_plain(config), f"{where}, {method}")
         same = seen.setdefault((method_name(method), str(config)), method)
         if same != method or spec.methods.count(method) > 1:
             raise UsageError(f"{where}, methods: {same} and {method} are the same method")
@@ -182,19 +196,22 @@ def load_spec(name_or_file: str, scale: Scale = "paper") -> Spec:
     name, field, scale or value, listing what is valid.
     """
     if name_or_file in packaged_specs():
-        text = resources.files("orchestrator.specs").joinpath(f"{name_or_file}.toml").read_text()
+        data = resources.files("orchestrator.specs").joinpath(f"{name_or_file}.toml").read_bytes()
         where = f"packaged spec {name_or_file}"
     elif Path(name_or_file).is_file():
-        text, where = Path(name_or_file).read_text(), name_or_file
+        data, where = Path(name_or_file).read_bytes(), name_or_file
     else:
         raise UsageError(
             f"no spec {name_or_file!r}: neither a file nor one of {', '.join(packaged_specs())}"
         )
     try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        content = tomllib.loads(data.decode())
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise UsageError(f"{where}: not valid TOML: {error}") from error
-    scales = {"paper": {}} | content.pop("scales", {})
+    scales = content.pop("scales", {})
+    if not isinstance(scales, dict) or not all(isinstance(s, dict) for s in scales.values()):
+        raise UsageError(f"{where}, scales: expected a table of fields for each scale")
+    scales = {"paper": {}} | scales
     if scale not in scales:
         raise UsageError(f"{where}: no scale {scale!r}; it has {', '.join(scales)}")
     return spec_from_plain(_merged(content, scales[scale]) | {"scale": scale}, where)
@@ -203,7 +220,7 @@ def load_spec(name_or_file: str, scale: Scale = "paper") -> Spec:
 def spec_from_plain(content: Plain, where: str) -> Spec:
     """A spec from parsed TOML or from a run directory's spec.json."""
     benchmark = content.get("benchmark")
-    if benchmark not in BENCHMARKS:
+    if not isinstance(benchmark, str) or benchmark not in BENCHMARKS:
         raise UsageError(
             f"{where}: unknown benchmark {benchmark!r}; there are {', '.join(BENCHMARKS)}"
         )

@@ -59,6 +59,45 @@ def test_a_broken_file_is_refused_naming_it(tmp_path: Path, text: str, message: 
         load_spec(str(path))
 
 
+SOUND = "benchmark='maze'\nname='x'\ntitle=''\ntasks=['g0>g1']\nstep_limits={2=50}\n"
+SOUND += "methods=['no-stitch']\n"
+
+
+def test_the_spec_below_is_sound(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text(SOUND)
+    assert load_spec(str(tmp_path / "mine.toml")).all_tasks == [("g0", "g1")]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (SOUND + "[agent]\nlearning_rate = nan", "agent, learning_rate: nan is no finite number"),
+        (SOUND + "[data]\nnoise = -inf", "data, noise: -inf is no finite number"),
+        (SOUND.replace("no-stitch", "mb-stitch[beta=inf]"), "beta: inf is no finite number"),
+        (SOUND.replace("2=50", "2=0"), "step_limits, 2: must be at least 1"),
+        (SOUND + "scales = ['paper']", "scales: expected a table"),
+        (SOUND + "scales.paper = 3", "scales: expected a table"),
+        (SOUND.replace("'maze'", "['maze']"), r"unknown benchmark \['maze'\]; there are maze"),
+        (SOUND.replace("''", "1979-05-27"), "title: expected str"),
+        (SOUND + "# \udcff", "not valid TOML"),
+        (SOUND + "rollout = " + 9999 * "[", "not valid TOML"),
+        (SOUND.replace("'x'", "'..'"), r"'\.\.' is no name"),
+        (SOUND.replace("'x'", "'a/../../b'"), "'a/../../b' is no name"),
+        (SOUND.replace("'x'", "'/etc/x'"), "'/etc/x' is no name"),
+        (SOUND.replace("'x'", '"x\\u0000"'), "is no name"),
+        (SOUND + "[[tables]]\nid = '../../x'\npaper = '1'", r"'\.\./\.\./x' is no name"),
+        (SOUND + "[[tables]]\nid = 'x'\npaper = '1'\nrows = 'odd'", "no rows 'odd'; there are"),
+    ],
+)
+def test_what_cannot_be_carried_out_is_refused_at_once(
+    tmp_path: Path, text: str, message: str
+) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_bytes(text.encode(errors="surrogateescape"))
+    with pytest.raises(UsageError, match=rf"(?s)(mine\.toml|spec ).*{message}"):
+        load_spec(str(path))
+
+
 @pytest.mark.parametrize(
     "bait",
     [

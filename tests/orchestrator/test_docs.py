@@ -1,0 +1,33 @@
+"""What the documentation shows is valid."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from orchestrator.cli import COMMANDS
+from orchestrator.plan import make_plan
+from orchestrator.spec import load_spec
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.parametrize("scale", ["smoke", "paper"])
+def test_the_example_table_can_be_planned(tmp_path: Path, scale: str) -> None:
+    text = (ROOT / "docs" / "extending.md").read_text()
+    (example,) = re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL)
+    path = tmp_path / "my-table.toml"
+    path.write_text(example)
+    spec = load_spec(str(path), scale)  # type: ignore[arg-type]
+    assert make_plan(spec).nodes
+
+
+def test_every_command_is_in_the_readme() -> None:
+    text = (ROOT / "README.md").read_text()
+    assert set(re.findall(r"^skillstitch (\w+)", text, flags=re.MULTILINE)) == set(COMMANDS)
+
+
+@pytest.mark.parametrize("document", [*sorted(ROOT.glob("docs/*.md")), ROOT / "README.md"])
+def test_links_lead_somewhere(document: Path) -> None:
+    for target in re.findall(r"\]\((?!http)([^)#]+)\)", document.read_text()):
+        assert (document.parent / target).exists(), target
