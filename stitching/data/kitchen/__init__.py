@@ -1,0 +1,1 @@
+"""Kitchen datasets: scripted demonstrations in human orders, and human ones, cut into skills."""

@@ -1,0 +1,144 @@
+"""Scripted demonstrations of several skills in a row, and the datasets cut from them.
+
+The paper does not say where its kitchen data came from. Its tables fit skills cut from people's
+demonstrations of four skills in a row, so that is what is made here, for all seven skills.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stitching.data.kitchen.arm import Arm
+from stitching.data.kitchen.programs import PROGRAMS, Program, perform, style
+from stitching.data.kitchen.segments import Episode, Order, Segment, as_transitions, cut
+from stitching.data.transitions import Transitions
+from stitching.envs.kitchen import JOINTS, KITCHEN, SKILLS, KitchenBlock
+from stitching.streams import stream
+
+SHORT = {name.split()[0]: name for name in SKILLS}
+HUMAN_ORDERS = """
+kettle-bottom-hinge-slide kettle-bottom-light-slide kettle-bottom-light-hinge
+kettle-light-hinge-slide kettle-top-bottom-slide kettle-top-bottom-hinge
+kettle-top-bottom-light kettle-top-light-slide microwave-bottom-hinge-slide
+microwave-bottom-light-slide microwave-kettle-bottom-hinge microwave-kettle-bottom-slide
+microwave-kettle-hinge-slide microwave-kettle-light-slide microwave-kettle-light-hinge
+microwave-kettle-top-hinge microwave-kettle-top-light microwave-light-hinge-slide
+microwave-top-bottom-hinge microwave-top-bottom-slide microwave-top-bottom-light
+microwave-top-light-hinge top-bottom-hinge-slide top-bottom-light-slide
+"""
+
+
+def human_orders() -> tuple[Order, ...]:
+    """The 24 orders in which people did four skills for Relay Policy Learning (2019)."""
+    return tuple(tuple(SHORT[word] for word in order.split("-")) for order in HUMAN_ORDERS.split())
+
+
+@dataclass(frozen=True)
+class KitchenDataConfig:
+    episodes: int = 24  # demonstrations an order
+    quality: float = 0.8  # of the hand: from 1, a steady expert, down to 0
+    skill_steps: int = 160  # after which a skill counts as missed and the demonstration ends
+    return_home: bool = False  # to the start posture before another skill; people do not
+    keep_failures: bool = False  # keep the segment of a missed skill, as one without success
+
+
+class Demonstrator:
+    """The hand of one episode, going through an order of skills."""
+
+    def __init__(self, order: Order, config: KitchenDataConfig, rng: np.random.Generator) -> None:
+        self._todo, self._config, self._rng = list(order), config, rng
+        self._style = style(config.quality)
+        self._done = np.zeros(len(SKILLS), dtype=bool)
+        self._last: Program | None = None
+        self._moves: Iterator[np.ndarray] | None = None
+        self._steps = 0
+
+    def act(self, arm: Arm, achieved: np.ndarray) -> np.ndarray | None:
+        """Next action (9,) for what `arm` sees and the goals (7,) that hold; None at the end."""
+        self._done |= achieved
+        while self._todo and self._done[SKILLS.index(self._todo[0])]:
+            self._last = PROGRAMS[self._todo.pop(0)]
+            self._moves, self._steps = None, 0
+        if not self._todo or self._steps == self._config.skill_steps:
+            return None
+        if self._moves is None:
+            program = PROGRAMS[self._todo[0]]
+            self._moves = perform(
+                program,
+                arm,
+                self._style,
+                self._rng,
+                last=self._last,
+                return_home=self._config.return_home,
+            )
+        self._steps += 1
+        noise = self._style.noise * self._rng.standard_normal(JOINTS)
+        return np.clip(next(self._moves) + noise, -1, 1).astype(np.float32)
+
+
+def demonstrate(block: KitchenBlock, hands: Sequence[Demonstrator]) -> list[Episode]:
+    """Let each hand go on from its episode's state, until it is done or gives up.
+
+    Physics that diverge end their episode before the step that did it.
+    """
+    arm, rows = Arm(), np.arange(len(hands))
+    seen = [[row] for row in block.observe(rows)]
+    done = [[row] for row in _achieved(block, rows)]
+    acted: list[list[np.ndarray]] = [[] for _ in hands]
+    while len(rows):
+        moves = {}
+        for row in rows.tolist():
+            arm.see(seen[row][-1])
+            action = hands[row].act(arm, done[row][-1])
+            if action is not None:
+                moves[row] = action
+        if not moves:
+            break
+        rows = np.array(list(moves))
+        block.step(rows, np.stack(list(moves.values())))
+        rows = rows[~block.diverged[rows]]
+        after = zip(rows.tolist(), block.observe(rows), _achieved(block, rows), strict=True)
+        for row, observation, achieved in after:
+            acted[row].append(moves[row])
+            seen[row].append(observation)
+            done[row].append(achieved)
+    return [
+        Episode(np.array(o), np.array(a, dtype=np.float32).reshape(-1, JOINTS), np.array(d))
+        for o, a, d in zip(seen, acted, done, strict=True)
+    ]
+
+
+def _achieved(block: KitchenBlock, rows: np.ndarray) -> np.ndarray:
+    """Which of the goals hold: (n, 7)."""
+    return np.stack([block.achieved(rows, skill) for skill in range(len(SKILLS))], axis=1)
+
+
+def play(config: KitchenDataConfig, order: Order, seed: int) -> list[list[Segment]]:
+    """The demonstrations of one order, each cut into its skills."""
+    labels = [
+        ("demonstrations", "kitchen", seed, "-".join(order), e) for e in range(config.episodes)
+    ]
+    block = KITCHEN.block()
+    block.reset([stream("environment", *label) for label in labels])
+    hands = [Demonstrator(order, config, stream("hand", *label)) for label in labels]
+    return [cut(episode, order) for episode in demonstrate(block, hands)]
+
+
+def collect(config: KitchenDataConfig, orders: Sequence[Order], seed: int) -> Transitions:
+    """Demonstrations of several skills in these orders, cut into skills.
+
+    An episode depends on the configuration, the seed, its order and its number alone, so the
+    collection of all orders is the concatenation of the collections of each.
+    """
+    segments = [s for order in orders for one in play(config, order, seed) for s in one]
+    return as_transitions([s for s in segments if s.success or config.keep_failures])
+
+
+def single_skill(
+    config: KitchenDataConfig, seed: int, names: Sequence[str] = SKILLS
+) -> Transitions:
+    """Each skill alone, from the start pose only."""
+    return collect(config, [(name,) for name in names], seed)

@@ -1,0 +1,72 @@
+"""Episodes of several skills, cut into skills where each is first achieved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stitching.data.transitions import DataError, Transitions
+from stitching.envs.kitchen import SKILLS
+
+Order = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Episode:
+    """What happened in T steps: one more observation than actions."""
+
+    observations: np.ndarray  # (T + 1, 59) float32
+    actions: np.ndarray  # (T, 9) float32
+    achieved: np.ndarray  # (T + 1, 7) bool: which goals hold
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One skill of an episode: the steps that led to its first achievement, or that missed it."""
+
+    episode: Episode
+    start: int
+    end: int  # one past the last step
+    skill: int
+    success: bool
+
+    def __len__(self) -> int:
+        return self.end - self.start
+
+
+def cut(episode: Episode, order: Order = ()) -> list[Segment]:
+    """The skills of an episode, each from the end of the one before to its own first achievement.
+
+    What an episode began with, or achieved in the same step as another skill, has no segment. The
+    steps after the last achievement are one without success, of the order's first skill not done.
+    """
+    when = np.where(episode.achieved.any(axis=0), episode.achieved.argmax(axis=0), -1)  # (7,)
+    segments, start = [], 0
+    for skill in np.argsort(when, kind="stable").tolist():
+        if when[skill] > start:
+            segments.append(Segment(episode, start, int(when[skill]), skill, True))
+            start = int(when[skill])
+    missed = [SKILLS.index(name) for name in order if when[SKILLS.index(name)] < 0]
+    if missed and start < len(episode.actions):
+        segments.append(Segment(episode, start, len(episode.actions), missed[0], False))
+    return segments
+
+
+def as_transitions(segments: Sequence[Segment]) -> Transitions:
+    if not segments:
+        raise DataError("no demonstration achieves a skill: nothing to make a dataset of")
+
+    def stack(column: str, offset: int = 0) -> np.ndarray:
+        rows = [getattr(s.episode, column)[s.start + offset : s.end + offset] for s in segments]
+        return np.concatenate(rows)
+
+    return Transitions(
+        observations=stack("observations"),
+        actions=stack("actions"),
+        next_observations=stack("observations", 1),
+        episode_ends=np.cumsum([len(s) for s in segments]),
+        episode_skills=np.array([s.skill for s in segments], dtype=np.int64),
+        episode_successes=np.array([s.success for s in segments]),
+    )

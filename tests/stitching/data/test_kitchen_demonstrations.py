@@ -1,0 +1,140 @@
+"""Scripted kitchen demonstrations: true, cut where achieved, a function of seed, order, episode."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stitching.data.kitchen.demonstrations import (
+    KitchenDataConfig,
+    collect,
+    human_orders,
+    single_skill,
+)
+from stitching.data.kitchen.rates import RatesConfig, success_rates, summary
+from stitching.data.transitions import DataError, Transitions, check, concatenate
+from stitching.envs.kitchen import GOAL_RADIUS, KITCHEN, SKILLS, START, goal_distances
+
+CONFIG = KitchenDataConfig(episodes=1)
+ORDERS = (
+    ("microwave", "kettle", "hinge cabinet", "slide cabinet"),
+    ("top burner", "bottom burner", "light switch", "slide cabinet"),
+)
+BLUR = 0.005  # more than the observation's noise moves a distance
+SHORT_ORDERS = (("kettle",), ("microwave",))
+
+
+@pytest.fixture(scope="module")
+def data() -> Transitions:
+    return collect(CONFIG, ORDERS, seed=0)
+
+
+def same_bytes(first: Transitions, second: Transitions) -> bool:
+    pairs = zip(first.columns().values(), second.columns().values(), strict=True)
+    return all(a.tobytes() == b.tobytes() for a, b in pairs)
+
+
+def goal_distance(observations: np.ndarray, skill: int) -> np.ndarray:
+    return goal_distances(np.hstack([observations[:, :9], observations[:, 18:39]]), skill)
+
+
+def test_the_24_human_orders() -> None:
+    orders = human_orders()
+    assert len(set(orders)) == 24
+    assert all(len(set(order)) == 4 for order in orders)
+    assert {name for order in orders for name in order} == set(SKILLS)
+    assert all("microwave" not in order[1:] for order in orders)
+
+
+def test_demonstrations_hold_what_their_orders_ask_for(data: Transitions) -> None:
+    check(data, KITCHEN, "data")
+    shown = [SKILLS[skill] for skill in data.episode_skills]
+    assert shown == [name for order in ORDERS for name in order]
+    assert data.episode_successes.all()
+
+
+def test_a_segment_ends_where_its_skill_is_first_achieved(data: Transitions) -> None:
+    for start, end, skill in zip(
+        data.episode_starts, data.episode_ends, data.episode_skills, strict=True
+    ):
+        distances = goal_distance(data.next_observations[start:end], skill)
+        assert (distances[:-1] > GOAL_RADIUS - BLUR).all()
+        assert distances[-1] < GOAL_RADIUS + BLUR
+
+
+def test_demonstrations_are_unbroken_through_their_skills(data: Transitions) -> None:
+    first_of_an_order = [0, data.episode_ends[len(ORDERS[0]) - 1]]
+    inside = np.setdiff1d(np.arange(len(data)), first_of_an_order)
+    assert np.array_equal(data.observations[inside], data.next_observations[inside - 1])
+
+
+def test_actions_lead_to_what_was_recorded(data: Transitions) -> None:
+    """Joint positions asked for by an action are approached, not passed."""
+    asked = 0.16 * data.actions[:, :7]
+    moved = data.next_observations[:, :7] - data.observations[:, :7]
+    assert np.corrcoef(asked.ravel(), moved.ravel())[0, 1] > 0.8
+
+
+@pytest.fixture(scope="module")
+def short() -> Transitions:
+    return collect(replace(CONFIG, episodes=2), SHORT_ORDERS, seed=0)
+
+
+def test_orders_can_be_collected_apart(short: Transitions) -> None:
+    config = replace(CONFIG, episodes=2)
+    parts = [collect(config, [order], seed=0) for order in SHORT_ORDERS]
+    assert same_bytes(concatenate(parts), short)
+
+
+def test_fewer_episodes_are_the_first_of_more(short: Transitions) -> None:
+    fewer = collect(CONFIG, SHORT_ORDERS[:1], seed=0)
+    assert fewer.actions.tobytes() == short.actions[: len(fewer)].tobytes()
+
+
+def test_another_seed_gives_other_demonstrations(short: Transitions) -> None:
+    assert not same_bytes(collect(replace(CONFIG, episodes=2), SHORT_ORDERS, seed=1), short)
+
+
+def test_single_skills_start_from_the_start_pose() -> None:
+    single = single_skill(CONFIG, seed=0, names=("kettle", "microwave"))
+    starts = single.observations[single.episode_starts]
+    assert np.abs(starts[0] - starts[1]).max() < 0.02  # noise alone
+    assert [SKILLS[skill] for skill in single.episode_skills] == ["kettle", "microwave"]
+
+
+def test_a_missed_skill_ends_its_demonstration_and_is_kept_on_demand() -> None:
+    config = replace(CONFIG, skill_steps=5)
+    with pytest.raises(DataError, match="no demonstration"):
+        collect(config, ORDERS, seed=0)
+    kept = collect(replace(config, keep_failures=True), ORDERS, seed=0)
+    assert kept.episode_ends.tolist() == [5, 10]
+    assert [SKILLS[skill] for skill in kept.episode_skills] == [order[0] for order in ORDERS]
+    assert not kept.episode_successes.any()
+
+
+@pytest.mark.parametrize("return_home", [True, False])
+def test_the_hand_goes_home_between_skills_if_it_shall(return_home: bool) -> None:
+    order = ("bottom burner", "light switch")
+    data = collect(replace(CONFIG, return_home=return_home), [order], seed=0)
+    (second,) = data.episode_rows(SKILLS.index("light switch"))
+    nearest = np.abs(data.observations[second, :7] - START[:7]).max(axis=1).min()
+    assert (nearest < 0.35) == return_home
+
+
+def test_a_poor_hand_is_worse_than_an_expert() -> None:
+    config = replace(CONFIG, episodes=3, skill_steps=100, keep_failures=True)
+    expert, poor = (
+        collect(replace(config, quality=quality), [("slide cabinet",)], seed=0)
+        for quality in (1.0, 0.0)
+    )
+    assert expert.episode_successes.all()
+    assert len(expert) < len(poor)
+
+
+def test_every_demonstrator_works_from_the_start_pose() -> None:
+    attempts = success_rates(RatesConfig(attempts=2, episodes=0))
+    assert set(attempts) == {("start", name) for name in SKILLS}
+    done = [steps > 0 for each in attempts.values() for steps in each]
+    assert len(done) == 2 * len(SKILLS)
+    assert np.mean(done) >= 0.9
+    assert "kettle         from start             2 of    2" in summary(attempts)
