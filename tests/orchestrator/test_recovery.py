@@ -6,10 +6,13 @@ A few kills of each kind by default; SKILLSTITCH_KILLS=10 asks for ten seeds of 
 import multiprocessing
 import os
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,22 +20,38 @@ import pytest
 
 from orchestrator.spec import Spec
 from tests.orchestrator.executors.processes import descendants, title, titled
-from tests.orchestrator.tiny import TINY, Place, blocks_played, promised_bytes, tiny_spec
+from tests.orchestrator.tiny import (
+    TINY,
+    Place,
+    blocks_played,
+    carry_out,
+    promised_bytes,
+    serially,
+    tiny_spec,
+)
 
 SEEDS = range(int(os.environ.get("SKILLSTITCH_KILLS", "3")))
 KILLS_IN_A_ROW = 3
 
 
-def _carry_out(place: Place | None) -> None:
-    if place is not None:
-        place.carry_out(tiny_spec())
+def _start_nothing() -> None:
+    pass
 
 
-def in_a_process(place: Place | None) -> multiprocessing.Process:
+def _carry_out(place: Place) -> None:
+    place.carry_out(tiny_spec())
+
+
+def _carry_out_tracked(place: Place) -> None:
+    settings = replace(serially(place.out, place.store_root), tracking_uri=None)
+    carry_out(tiny_spec(), settings)
+
+
+def in_a_process(target: Callable[..., None], *arguments: Place) -> multiprocessing.Process:
     """From a server that has imported everything, so that kills hit the run and not its start."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["tests.orchestrator.tiny", "matplotlib.pyplot"])
-    process = context.Process(target=_carry_out, args=(place,))
+    process = context.Process(target=target, args=arguments)
     process.start()
     return process  # type: ignore[return-value]
 
@@ -40,9 +59,9 @@ def in_a_process(place: Place | None) -> multiprocessing.Process:
 @pytest.fixture(scope="module")
 def duration(tmp_path_factory: pytest.TempPathFactory) -> float:
     """Seconds of an undisturbed run in a process, once the server is there."""
-    in_a_process(None).join()
+    in_a_process(_start_nothing).join()
     started = time.monotonic()
-    process = in_a_process(Place(tmp_path_factory.mktemp("undisturbed")))
+    process = in_a_process(_carry_out, Place(tmp_path_factory.mktemp("undisturbed")))
     process.join()
     assert process.exitcode == 0
     return time.monotonic() - started
@@ -55,7 +74,7 @@ def test_the_serial_driver_is_killed(
 ) -> None:
     rng = np.random.default_rng(seed)
     for moment in rng.uniform(0, duration, KILLS_IN_A_ROW):
-        process = in_a_process(place)
+        process = in_a_process(_carry_out, place)
         process.join(moment)
         process.kill()
         process.join()
@@ -64,6 +83,34 @@ def test_the_serial_driver_is_killed(
     assert promised_bytes(place.out) == expected
     assert place.directory.finished
     assert place.directory.read_json("quarantine.json") == []
+
+
+def statuses(place: Place) -> list[str]:
+    """Of all MLflow runs, as its database has them."""
+    database = place.root / "mlflow.db"
+    if not database.is_file():
+        return []
+    with closing(sqlite3.connect(f"file:{database}?mode=ro", uri=True, timeout=30)) as db:
+        try:
+            return [status for (status,) in db.execute("SELECT status FROM runs")]
+        except sqlite3.OperationalError:  # the file is there, its tables are not yet
+            return []
+
+
+@pytest.mark.slow
+def test_mlflow_shows_nothing_running_after_a_kill(place: Place, spec: Spec) -> None:
+    process = in_a_process(_carry_out_tracked, place)
+    while process.exitcode is None and "RUNNING" not in statuses(place):
+        time.sleep(0.01)
+    process.kill()
+    process.join()
+    assert "RUNNING" in statuses(place)
+
+    process = in_a_process(_carry_out_tracked, place)
+    process.join()
+    assert process.exitcode == 0
+    assert place.directory.finished
+    assert statuses(place) == ["FINISHED"] * (1 + len(spec.methods) * spec.seeds)
 
 
 @pytest.fixture
