@@ -25,6 +25,7 @@ REPORTED_PACKAGES = (
     "mlflow",
     "pandas",
 )
+SOURCES = ("stitching", "orchestrator", "sweeps", "analysis", "pyproject.toml", "constraints.txt")
 
 
 def matters() -> Plain:
@@ -59,19 +60,27 @@ def _version(package: str) -> str:
 
 
 def git_revision() -> str:
-    """Commit of the source tree, marked when it has uncommitted changes."""
-    source = Path(__file__).parent
+    """Commit of the source tree, marked when the sources have uncommitted changes.
+
+    What a run itself writes, such as `results/`, does not count.
+    """
     try:
-        answer = subprocess.run(
-            ["git", "describe", "--always", "--dirty", "--abbrev=12", "--exclude=*"],
-            cwd=source,
-            capture_output=True,
-            text=True,
-            timeout=10,
-            check=True,
-        )
+        commit = _git("rev-parse", "--short=12", "HEAD")
+        changes = _git("status", "--porcelain", "--", *SOURCES)
     except (OSError, subprocess.SubprocessError):
         return "unknown"
+    return f"{commit}-dirty" if changes else commit
+
+
+def _git(*arguments: str) -> str:
+    answer = subprocess.run(
+        ["git", *arguments],
+        cwd=Path(__file__).parents[1],
+        capture_output=True,
+        text=True,
+        timeout=10,
+        check=True,
+    )
     return answer.stdout.strip()
 
 
