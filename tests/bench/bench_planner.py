@@ -66,7 +66,7 @@ def in_blocks(planner: Planner, score: KitchenScore, block: int) -> Iterator[Pla
 def measure() -> Iterator[Result]:
     yield from _compare("to convergence", KITCHEN, problems=4, blocks=(4,), repetitions=1)
     rounds = replace(KITCHEN, tolerance=0.0, iterations=10)
-    yield from _compare("10 iterations", rounds, problems=32, blocks=(8, 32), repetitions=3)
+    yield from _compare("10 iterations", rounds, problems=16, blocks=(4, 16), repetitions=3)
 
 
 def _compare(

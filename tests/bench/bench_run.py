@@ -19,18 +19,16 @@ def outside(directory: Path | None) -> Iterator[Result]:
     run = _run(directory)
     loading = _seconds_to_load()
     whole = sum(run.seconds.values()) + loading
-    rest = {phase: s for phase, s in run.seconds.items() if phase not in run.busy}
-    worked = run.workers * run.working
     yield Result(
         "outside",
         f"{_name(run, directory)}: wall time outside training and simulation, share",
         {
             "s in all": whole,
-            **run.seconds,
+            **dict(sorted(run.seconds.items(), key=lambda phase: -phase[1])),
             "loading Python": loading,
-            "workers busy while training and simulating, share": sum(run.busy.values()) / worked,
+            f"busy workers of {run.workers}": run.busy_workers,
         },
-        ratio=(sum(rest.values()) + loading) / whole,
+        ratio=1 - run.working / whole,
         at_most=0.1 if run.scale == "paper" else None,
     )
 

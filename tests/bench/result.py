@@ -5,6 +5,7 @@ from __future__ import annotations
 import statistics
 from collections.abc import Callable
 from dataclasses import dataclass
+from textwrap import fill
 from time import process_time
 
 HEADER = f"{'bench':<12}{'measured':<66}{'ratio':>8}{'target':>9}{'met':>6}"
@@ -34,10 +35,12 @@ class Result:
         return "yes" if above and below else "no"
 
     def lines(self) -> str:
-        """A row under HEADER, and one with the numbers."""
+        """A row under HEADER, and below it the numbers."""
         numbers = " · ".join(f"{name} {_readable(value)}" for name, value in self.numbers.items())
+        indent = " " * 12
+        below = fill(numbers, len(HEADER), initial_indent=indent, subsequent_indent=indent)
         row = f"{self.bench:<12}{self.measured:<66}{self.ratio:>8.2f}{self.target:>9}{self.met:>6}"
-        return f"{row}\n{'':<12}{numbers}"
+        return f"{row}\n{below}"
 
 
 def _readable(number: float) -> str:

@@ -29,6 +29,11 @@ class Run:
         """Wall seconds of training and simulation."""
         return self.seconds["training"] + self.seconds["evaluation"]
 
+    @property
+    def busy_workers(self) -> float:
+        """How many workers were busy on average, meanwhile."""
+        return sum(self.busy.values()) / self.working
+
 
 def carry_out(folder: Path, *options: str) -> Run:
     """Table 1 in a process of its own, over a fresh store in `folder`."""
@@ -41,6 +46,7 @@ def carry_out(folder: Path, *options: str) -> Run:
 
 
 def read(directory: Path) -> Run:
+    """What the last command that trained or simulated took; for a resumed run that is a part."""
     spec, provenance, seconds = (
         json.loads((directory / f"{name}.json").read_text())
         for name in ("spec", "provenance", "seconds")
@@ -52,7 +58,7 @@ def read(directory: Path) -> Run:
     return Run(
         scale=spec["scale"],
         workers=provenance["workers"],
-        seconds=seconds,
+        seconds=provenance["seconds"] | seconds,
         busy=provenance["busy worker seconds"],
         segments=counts["segments played"],
         steps=counts["environment steps"],
