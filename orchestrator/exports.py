@@ -65,7 +65,7 @@ def learning_curves(plan: Plan, store: Store) -> list[Plain]:
     """Curves of every trained artifact of the plan."""
     curves = []
     for key, recipe in plan.recipes.items():
-        if key == plan.showcase:
+        if key not in plan.needed:
             continue
         info = store.read(recipe.kind, key).info
         if "curves" in info:
@@ -90,7 +90,7 @@ def datasets(plan: Plan, store: Store) -> list[Plain]:
         digest = store.manifest(kind, key)["digest"]
         listing.append(
             {"name": name, "key": key, "digest": digest}
-            | {field: info[field] for field in ("rows", "episodes", "successes")}
+            | {field: value for field, value in info.items() if field != "format"}
         )
     return listing
 
@@ -102,10 +102,10 @@ def write_readable(plan: Plan, store: Store, ledger: Ledger, directory: RunDirec
     directory.write_json("quarantine.json", quarantine(plan, ledger))
     directory.write_json("training.json", learning_curves(plan, store))
     directory.write_json("datasets.json", datasets(plan, store))
-    if plan.showcase is not None:
-        kind = plan.recipes[plan.showcase].kind
-        if (kind, plan.showcase) in store:
-            directory.write_json("showcase.json", store.read(kind, plan.showcase).info)
+    for name, key in plan.illustrations.items():
+        kind = plan.recipes[key].kind
+        if (kind, key) in store:
+            directory.write_json(f"{name}.json", store.read(kind, key).info)
     return {
         "segments played": len(segments),
         "environment steps": int(segments["steps"].sum()),

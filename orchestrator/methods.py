@@ -48,6 +48,11 @@ class MBStitchConfig:
     random_shooting: RandomShooting = RandomShooting()
     cem: CEM = CEM()
 
+    @property
+    def horizon(self) -> int:
+        """Steps that plans look ahead."""
+        return (self.cem if self.planner == "cem" else self.random_shooting).horizon
+
 
 MethodConfig = NoStitchConfig | RandomStitchConfig | MFStitchConfig | MBStitchConfig
 

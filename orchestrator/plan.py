@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
-from orchestrator.builders import BLOCK_CODE, KITS, SETUP_CODE
+from orchestrator.builders import BLOCK_CODE, SETUP_CODE
 from orchestrator.jobs import BlockTask
+from orchestrator.kits import KITS, Kit
 from orchestrator.methods import METHODS, MFStitchConfig, method_name
 from orchestrator.recipes import Recipe, code_fingerprint, digest
 from orchestrator.spec import Spec
@@ -41,8 +42,8 @@ class Plan:
     agents: dict[int, str]  # seed → key
     dynamics: dict[int, str]
     mf_policies: dict[tuple[int, str], str]  # (seed, method) → key
-    datasets: dict[str, str]  # name → key
-    showcase: str | None
+    datasets: dict[str, str]  # role → key
+    illustrations: dict[str, str]  # name → key
     nodes: tuple[Node, ...]
 
     @cached_property
@@ -70,8 +71,9 @@ class Plan:
 
     @property
     def needed(self) -> set[str]:
-        """Artifacts that the numbers depend on: all but the showcase."""
-        return set(self.recipes) - {self.showcase}
+        """Artifacts that the numbers depend on: all but what is only looked at."""
+        used = {*self.agents.values(), *self.dynamics.values(), *self.mf_policies.values()}
+        return used | {key for made in used for key in self.recipes[made].inputs.values()}
 
     def roots(self) -> Iterator[Node]:
         return (node for node in self.nodes if node.parent is None)
@@ -119,8 +121,9 @@ def make_plan(spec: Spec) -> Plan:
     root = {"root_seed": spec.root_seed}
     data = {"config": to_plain(spec.data), **root}
     kit = KITS[spec.benchmark]
-    datasets = {role: add(kind, data) for role, kind in kit.datasets.items()}
-    demonstrations = {"demonstrations": datasets["demonstrations"]}
+    made = kit.datasets(spec.data)
+    datasets = {role: add(one.kind, data | one.params) for role, one in made.items()}
+    demonstrations = {role: datasets[role] for role, one in made.items() if one.teaches}
     seeds = range(spec.seeds)
     agents = {
         seed: add("agent", {"config": to_plain(spec.agent), "seed": seed, **root}, demonstrations)
@@ -137,25 +140,29 @@ def make_plan(spec: Spec) -> Plan:
             if isinstance(config, MFStitchConfig):
                 params = {"config": to_plain(config.training), "seed": seed, **root}
                 mf_policies[seed, method] = add("mf-policy", params, demonstrations)
-    showcase = None
-    if kit.showcase is not None and "dynamics" in needed:
-        params = _shown(spec, kit.shown_task)
-        models = {"agent": agents[0], "dynamics": dynamics[0]}
-        showcase = add(kit.showcase, params, models | demonstrations)
+    illustrations = {}
+    if "dynamics" in needed:
+        extras = {role: add(kind, data) for role, kind in kit.extras.items()}
+        there = {"agent": agents[0], "dynamics": dynamics[0], **datasets, **extras}
+        for name, one in kit.illustrations.items():
+            inputs = {role: there[role] for role in one.inputs}
+            illustrations[name] = add(one.kind, _illustrated(spec, kit), inputs)
     return Plan(
-        spec, recipes, agents, dynamics, mf_policies, datasets, showcase, tuple(_nodes(spec))
+        spec, recipes, agents, dynamics, mf_policies, datasets, illustrations, tuple(_nodes(spec))
     )
 
 
-def _shown(spec: Spec, task: tuple[str, ...]) -> Plain:
-    """What a showcase records: one task by direct chaining and by MB-Stitch."""
+def _illustrated(spec: Spec, kit: Kit) -> Plain:
+    """What an illustration may show: one task, by direct chaining and by MB-Stitch."""
     shown = [m for m in spec.methods if method_name(m) in ("no-stitch", "mb-stitch")]
+    task = kit.shown_task
     return {
         "methods": {method: to_plain(spec.method_config(method)) for method in shown},
         "configs": {"dynamics": to_plain(spec.dynamics)},
         "rollout": to_plain(spec.rollout),
         "task": task if task in spec.all_tasks else max(spec.all_tasks, key=len),
         "step_limit": spec.step_limit,
+        "horizon": spec.mb_stitch.horizon,
         "root_seed": spec.root_seed,
         "seed": 0,
     }

@@ -16,7 +16,8 @@ from orchestrator.builders import BUILDERS, SETUP_CODE
 from orchestrator.structure import Plain
 
 METHOD_PACKAGE = "stitching"
-NUMERIC_PACKAGES = ("numpy", "torch")  # whose versions may change the bytes of any result
+# Whose versions may change the bytes of any result.
+NUMERIC_PACKAGES = ("gymnasium-robotics", "mujoco", "numpy", "scipy", "torch")
 
 
 def canonical(plain: Any) -> str:

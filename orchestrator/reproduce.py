@@ -175,8 +175,8 @@ def _work(
         evaluation = Evaluation(plan, store, ledger, shared, executor, progress)
         evaluation.run()
         watch.lap("evaluation")
-        if plan.showcase is not None and plan.showcase not in present:
-            _build_showcase(builds, plan.showcase, plan.needed, progress)
+        _illustrate(builds, plan, present, progress)
+        watch.lap("illustrations")
     finally:
         executor.close()
         if announcement is not None:
@@ -192,12 +192,15 @@ def _work(
     }
 
 
-def _build_showcase(builds: Builds, key: str, present: set[str], progress: Progress) -> None:
-    """Last, and failing only costs the figure: it must not stand in the way of a number."""
+def _illustrate(builds: Builds, plan: Plan, present: set[str], progress: Progress) -> None:
+    """Last, and failing only costs a figure: it must not stand in the way of a number."""
+    missing = set(plan.recipes) - plan.needed - present
+    if not missing:
+        return
     try:
-        builds.run({key}, present, phase="showcase")
+        builds.run(missing, present | plan.needed, phase="illustrations")
     except (BadDataError, IncompleteError) as error:
-        progress.say(f"no showcase figure: {error}")
+        progress.say(f"figures will be missing: {error}")
 
 
 def _announce(directory: RunDirectory, uri: str) -> threading.Thread:

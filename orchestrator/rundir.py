@@ -32,7 +32,8 @@ class RunDirectory:
     identity.json     id of this run, and the versions that must not change under it
     ledger.sqlite     every finished block
     provenance.json   where, when and with what it was made
-    segments.parquet, episodes.parquet, training.json, datasets.json, showcase.json, report/
+    segments.parquet, episodes.parquet, training.json, datasets.json, report/
+    showcase.json, diagnosis.json  what only figures need, where the benchmark has it
     quarantine.json   blocks that were given up
     seconds.json      where the time of the last command that did any work went
     finished          there when all of the above is

@@ -14,8 +14,8 @@ from typing import Any, Literal
 import tyro
 
 from analysis.rows import ROW_RULES
-from orchestrator.builders import KITS
 from orchestrator.errors import UsageError
+from orchestrator.kits import KITS, DataConfig
 from orchestrator.methods import (
     METHODS,
     MBStitchConfig,
@@ -26,14 +26,12 @@ from orchestrator.methods import (
     parse_method,
 )
 from orchestrator.structure import Plain, structure, to_plain
-from stitching.data.maze import MazeDataConfig
 from stitching.envs.registry import BENCHMARKS
 from stitching.models.dynamics import DynamicsConfig
 from stitching.models.iql import IQLConfig
 from stitching.rollout import RolloutConfig
 
 Scale = Literal["smoke", "quick", "paper"]
-DataConfig = MazeDataConfig  # of any benchmark; `KITS` says whose is which
 NAME = re.compile(r"[A-Za-z0-9][\w.-]*")  # becomes part of paths
 
 

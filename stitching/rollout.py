@@ -20,7 +20,7 @@ class RolloutConfig:
     """How skills are executed; step limits of whole tasks belong to the spec."""
 
     sample_actions: bool = False  # sample the policy; its mode otherwise, as in IQL's evaluation
-    execution_limit: int = 0  # most steps of one skill's execution; 0: only the task's own limit
+    skill_limit: int = 0  # most steps of one skill, its stitch included; 0: only the task's own
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,9 @@ class Segments:
 class Recorder(Protocol):
     """Is told of every step, for pictures and studies; changes nothing."""
 
-    def step(self, block: EpisodeBlock, rows: np.ndarray, skill: int, phase: str) -> None: ...
+    def step(
+        self, block: EpisodeBlock, rows: np.ndarray, episodes: np.ndarray, skill: int, phase: str
+    ) -> None: ...
 
 
 @dataclass
@@ -68,7 +70,8 @@ class _Progress:
 
     block: EpisodeBlock
     skill: int
-    budget: np.ndarray  # (n,) steps each episode may still take
+    episodes: np.ndarray  # (n,) their numbers
+    budget: np.ndarray  # (n,) steps each may still take
     recorder: Recorder | None
     steps: np.ndarray = field(init=False)
     success: np.ndarray = field(init=False)
@@ -87,7 +90,7 @@ class _Progress:
         self.steps[rows] += 1
         self.success[rows] = self.block.achieved(rows, self.skill)
         if self.recorder is not None:
-            self.recorder.step(self.block, rows, self.skill, phase)
+            self.recorder.step(self.block, rows, self.episodes[rows], self.skill, phase)
 
 
 @torch.inference_mode()
@@ -109,7 +112,9 @@ def play_segment(
     names = [skill.name for skill in benchmark.skills]
     skill = names.index(play.prefix[-1])
     rows = np.arange(len(play.episodes))
-    progress = _Progress(block, skill, budget, recorder)
+    if config.skill_limit:
+        budget = np.minimum(budget, config.skill_limit)
+    progress = _Progress(block, skill, np.array(play.episodes), budget, recorder)
 
     value_start = _value(agent, block, rows, skill)
     if len(play.prefix) > 1 and stitcher.limit:
@@ -171,7 +176,6 @@ def _execute(
 ) -> None:
     """Execution phase: the skill's policy, until success or the end of the budget."""
     streams = play.streams("policy")
-    limit = progress.steps + config.execution_limit
     rows = progress.open(np.arange(len(play.episodes)))
     while len(rows):
         states = torch.from_numpy(progress.block.observe(rows))
@@ -180,8 +184,6 @@ def _execute(
             noise = policy_noise(benchmark.actions, [streams[row] for row in rows])
         progress.step(rows, agent.act(states, progress.skill, noise), "execute")
         rows = progress.open(rows)
-        if config.execution_limit:
-            rows = rows[progress.steps[rows] < limit[rows]]
 
 
 def _value(agent: Agent, block: EpisodeBlock, rows: np.ndarray, skill: int) -> np.ndarray:

@@ -63,6 +63,14 @@ START = (
 # An observation shows the robot's positions and velocities, then everything else's.
 SEEN = np.r_[0:9, 30:39, 9:30, 39:59]  # in positions and velocities joined
 
+# What an observation's numbers are of.
+GROUPS = {
+    "arm positions": slice(0, 9),
+    "arm velocities": slice(9, 18),
+    "object positions": slice(18, 39),
+    "object velocities": slice(39, 59),
+}
+
 # What the next substep depends on: positions, velocities, and the solver's warm start (29). Without
 # the last a restored state drifts as soon as something touches. Time, control, applied forces and
 # equality switches belong to MuJoCo's mjSTATE_INTEGRATION too, but here they are without effect,

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from stitching.data.transitions import Transitions
-from stitching.models.layers import init_mlp, mlp, parameters, prefixed
+from stitching.models.layers import Precision, at_precision, init_mlp, mlp, parameters, prefixed
 from stitching.models.scale import observation_scale
 from stitching.models.training import CurveLog, Trained, cosine
 from stitching.streams import stream
@@ -27,6 +27,7 @@ class DynamicsConfig:
     width: int = 128
     hidden_layers: int = 2
     activation: str = "relu"  # relu in the maze, elu in Kitchen, sigmoid in Robosuite
+    precision: Precision = "float32"  # of the hidden layers, while training and predicting
     log_every: int = 250
 
 
@@ -36,8 +37,8 @@ class Dynamics:
     def __init__(self, weights: dict[str, np.ndarray], config: DynamicsConfig) -> None:
         self._mean = torch.from_numpy(weights["observation_mean"])
         self._std = torch.from_numpy(weights["observation_std"])
-        self._params = parameters(weights, "t")
-        self._activation = config.activation
+        self._params = at_precision(parameters(weights, "t"), config.precision, output=True)
+        self._config = config
 
     def scaled(self, states: Tensor) -> Tensor:
         """States in units of the data's standard deviation, per dimension."""
@@ -48,7 +49,7 @@ class Dynamics:
         inputs = (states - self._mean) / self._std
         inputs = torch.cat([inputs, actions.expand(len(inputs), -1, -1)], dim=-1)
         members = self._params["w0"].shape[0]
-        change = mlp(self._params, inputs.expand(members, -1, -1), self._activation)
+        change = mlp(self._params, inputs.expand(members, -1, -1), self._config.activation)
         return states + change * self._std
 
 
@@ -78,7 +79,9 @@ def train_dynamics(data: Transitions, config: DynamicsConfig, *labels: str | int
         index = torch.from_numpy(
             batches.integers(len(data), size=(config.members, config.batch_size))
         )
-        loss = (mlp(params, inputs[index], config.activation) - targets[index]).square().mean()
+        layers = at_precision(params, config.precision)
+        predicted = mlp(layers, inputs[index], config.activation)
+        loss = (predicted - targets[index]).square().mean()
         optimizer.zero_grad(set_to_none=True)
         loss.backward()
         optimizer.step()

@@ -17,7 +17,7 @@ from torch import Tensor
 
 from stitching.data.experience import Experience
 from stitching.envs.protocol import ActionSpace
-from stitching.models.layers import Params, init_mlp, mlp, prefixed
+from stitching.models.layers import Params, Precision, at_precision, init_mlp, mlp, prefixed
 from stitching.models.scale import observation_scale
 from stitching.models.training import CurveLog, Trained, cosine
 from stitching.streams import stream
@@ -42,6 +42,7 @@ class IQLConfig:
     members: int = 5
     width: int = 64
     hidden_layers: int = 2
+    precision: Precision = "float32"  # of the hidden layers while training
     log_every: int = 500
 
 
@@ -87,6 +88,9 @@ def iql_losses(
     generator: torch.Generator,
 ) -> dict[str, Tensor]:
     """The three losses of IQL (its Eqs. 5, 6, 7), each averaged over batch and members."""
+    q, q_target, v, policy = (
+        at_precision(params, config.precision) for params in (q, q_target, v, policy)
+    )
     state_actions = torch.cat([batch.inputs, batch.actions], dim=-1)
     with torch.no_grad():
         q_slow = twin_minimum(mlp(q_target, state_actions))  # (M, B)

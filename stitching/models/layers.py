@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 import torch
@@ -12,6 +13,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 Params = dict[str, Tensor]
+Precision = Literal["float32", "bfloat16"]
 
 ACTIVATIONS: dict[str, Callable[[Tensor], Tensor]] = {
     "relu": F.relu,
@@ -42,22 +44,38 @@ def mlp(
     dropout: float = 0.0,
     generator: torch.Generator | None = None,
 ) -> Tensor:
-    """All members on their inputs: (members, n, in) → (members, n, out).
+    """All members on their inputs: (members, n, in) → (members, n, out), float32.
 
     Inputs of shape (n, in) are shown to every member. Dropout follows each hidden activation and
-    draws from `generator`.
+    draws from `generator`. A layer computes in the precision of its weights.
     """
     layers = len(params) // 2
     members = params["w0"].shape[0]
     hidden = inputs.expand(members, -1, -1) if inputs.dim() == 2 else inputs
     for layer in range(layers):
-        hidden = torch.baddbmm(params[f"b{layer}"], hidden, params[f"w{layer}"])
+        weight = params[f"w{layer}"]
+        hidden = torch.baddbmm(params[f"b{layer}"], hidden.to(weight.dtype), weight)
         if layer < layers - 1:
             hidden = ACTIVATIONS[activation](hidden)
             if dropout:
                 keep = torch.empty_like(hidden).bernoulli_(1 - dropout, generator=generator)
                 hidden = hidden * keep / (1 - dropout)
-    return hidden
+    return hidden.float()
+
+
+def at_precision(params: Params, precision: Precision, *, output: bool = False) -> Params:
+    """The same layers computing in that precision; the last one too where `output` asks for it.
+
+    Values keep their last layer in float32: near 1 they change from one step to the next by about
+    what bfloat16 rounds away.
+    """
+    last = len(params) // 2 - 1
+    return {
+        name: weight
+        if name[1:] == str(last) and not output
+        else weight.to(getattr(torch, precision))
+        for name, weight in params.items()
+    }
 
 
 def prefixed(params: Params, prefix: str) -> dict[str, np.ndarray]:

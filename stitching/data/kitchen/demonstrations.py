@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -36,9 +37,15 @@ def human_orders() -> tuple[Order, ...]:
     return tuple(tuple(SHORT[word] for word in order.split("-")) for order in HUMAN_ORDERS.split())
 
 
+Source = Literal["orders", "single-skill", "human"]
+
+
 @dataclass(frozen=True)
 class KitchenDataConfig:
+    source: Source = "orders"  # several skills in human orders, each alone, or people's recordings
+    human: str = ""  # for people's: a Minari id such as D4RL/kitchen/complete-v2, or an .npz file
     episodes: int = 24  # demonstrations an order
+    held_out: int = 9  # more of each order, to judge models by
     quality: float = 0.8  # of the hand: from 1, a steady expert, down to 0
     skill_steps: int = 160  # after which a skill counts as missed and the demonstration ends
     return_home: bool = False  # to the start posture before another skill; people do not
@@ -87,6 +94,7 @@ def demonstrate(block: KitchenBlock, hands: Sequence[Demonstrator]) -> list[Epis
     arm, rows = Arm(), np.arange(len(hands))
     seen = [[row] for row in block.observe(rows)]
     done = [[row] for row in _achieved(block, rows)]
+    states = [[row] for row in block.snapshot(rows)]
     acted: list[list[np.ndarray]] = [[] for _ in hands]
     while len(rows):
         moves = {}
@@ -100,14 +108,23 @@ def demonstrate(block: KitchenBlock, hands: Sequence[Demonstrator]) -> list[Epis
         rows = np.array(list(moves))
         block.step(rows, np.stack(list(moves.values())))
         rows = rows[~block.diverged[rows]]
-        after = zip(rows.tolist(), block.observe(rows), _achieved(block, rows), strict=True)
-        for row, observation, achieved in after:
+        after = zip(
+            rows.tolist(),
+            block.observe(rows),
+            _achieved(block, rows),
+            block.snapshot(rows),
+            strict=True,
+        )
+        for row, observation, achieved, state in after:
             acted[row].append(moves[row])
             seen[row].append(observation)
             done[row].append(achieved)
+            states[row].append(state)
     return [
-        Episode(np.array(o), np.array(a, dtype=np.float32).reshape(-1, JOINTS), np.array(d))
-        for o, a, d in zip(seen, acted, done, strict=True)
+        Episode(
+            np.array(o), np.array(a, dtype=np.float32).reshape(-1, JOINTS), np.array(d), np.array(s)
+        )
+        for o, a, d, s in zip(seen, acted, done, states, strict=True)
     ]
 
 
@@ -116,29 +133,50 @@ def _achieved(block: KitchenBlock, rows: np.ndarray) -> np.ndarray:
     return np.stack([block.achieved(rows, skill) for skill in range(len(SKILLS))], axis=1)
 
 
-def play(config: KitchenDataConfig, order: Order, seed: int) -> list[list[Segment]]:
-    """The demonstrations of one order, each cut into its skills."""
-    labels = [
-        ("demonstrations", "kitchen", seed, "-".join(order), e) for e in range(config.episodes)
-    ]
+def orders(config: KitchenDataConfig) -> tuple[Order, ...]:
+    """What the scripted demonstrators of a source are asked to do."""
+    return human_orders() if config.source == "orders" else tuple((name,) for name in SKILLS)
+
+
+def play(
+    config: KitchenDataConfig, order: Order, seed: int, episodes: Sequence[int] | None = None
+) -> list[list[Segment]]:
+    """The demonstrations of one order, each cut into its skills.
+
+    An episode depends on the configuration, the seed, its order and its number alone.
+    """
+    numbers = range(config.episodes) if episodes is None else episodes
+    labels = [("demonstrations", "kitchen", seed, "-".join(order), e) for e in numbers]
     block = KITCHEN.block()
     block.reset([stream("environment", *label) for label in labels])
     hands = [Demonstrator(order, config, stream("hand", *label)) for label in labels]
     return [cut(episode, order) for episode in demonstrate(block, hands)]
 
 
+def kept(config: KitchenDataConfig, demonstrations: list[list[Segment]]) -> list[Segment]:
+    """The segments that a dataset holds, in order."""
+    return [s for one in demonstrations for s in one if s.success or config.keep_failures]
+
+
 def collect(config: KitchenDataConfig, orders: Sequence[Order], seed: int) -> Transitions:
     """Demonstrations of several skills in these orders, cut into skills.
 
-    An episode depends on the configuration, the seed, its order and its number alone, so the
-    collection of all orders is the concatenation of the collections of each.
+    The collection of all orders is the concatenation of the collections of each.
     """
-    segments = [s for order in orders for one in play(config, order, seed) for s in one]
-    return as_transitions([s for s in segments if s.success or config.keep_failures])
+    return as_transitions([s for order in orders for s in kept(config, play(config, order, seed))])
 
 
-def single_skill(
-    config: KitchenDataConfig, seed: int, names: Sequence[str] = SKILLS
-) -> Transitions:
-    """Each skill alone, from the start pose only."""
-    return collect(config, [(name,) for name in names], seed)
+def held_out(config: KitchenDataConfig, seed: int) -> tuple[Transitions, np.ndarray]:
+    """Demonstrations of every order that no model has seen, and the state each skill began in.
+
+    The skills that succeeded (E episodes), and their snapshots (E, snapshot) float64.
+    """
+    numbers = range(config.episodes, config.episodes + config.held_out)
+    segments = [
+        segment
+        for order in orders(config)
+        for one in play(config, order, seed, numbers)
+        for segment in one
+        if segment.success
+    ]
+    return as_transitions(segments), np.array([s.episode.snapshots[s.start] for s in segments])

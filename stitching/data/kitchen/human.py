@@ -12,16 +12,40 @@ from typing import Any
 
 import numpy as np
 
-from stitching.data.kitchen.segments import Episode, as_transitions, cut
+from stitching.data.kitchen.segments import Episode, Segment, as_transitions, cut
 from stitching.data.transitions import DataError, Transitions
 from stitching.envs.kitchen import GOAL_RADIUS, JOINTS, KITCHEN, SKILLS, goal_distances
 
 Recording = tuple[np.ndarray, np.ndarray]  # observations (T + 1, 59), actions (T, 9)
 
 
+def human_demonstrations(source: str) -> list[list[Segment]]:
+    """People's demonstrations, each cut into its skills, from an .npz file or a Minari dataset.
+
+    A Minari id is looked for in MINARI_DATASETS_PATH first and downloaded if it is not there.
+    Raises DataError where neither works.
+    """
+    return [cut(_episode(*recording)) for recording in _recordings(source)]
+
+
 def human_data(recordings: Iterable[Recording]) -> Transitions:
     """The skills of these recordings; what follows an episode's last achievement is left out."""
     return as_transitions([s for recording in recordings for s in cut(_episode(*recording))])
+
+
+def _recordings(source: str) -> list[Recording]:
+    if source.endswith(".npz"):
+        if not Path(source).is_file():
+            raise DataError(f"no file {source}: data.human names an .npz file or a Minari dataset")
+        return npz_recordings(Path(source))
+    import minari  # its import is slow, and only this data needs it
+
+    try:
+        return minari_recordings(minari.load_dataset(source, download=True))
+    except Exception as error:  # from the hub's client: whatever its network layer raises
+        raise DataError(
+            f"no Minari dataset {source!r}, neither in MINARI_DATASETS_PATH nor on its hub: {error}"
+        ) from error
 
 
 def minari_recordings(dataset: Iterable[Any]) -> list[Recording]:
@@ -63,4 +87,5 @@ def _episode(observations: np.ndarray, actions: np.ndarray) -> Episode:
         observations=observations.astype(np.float32),
         actions=np.clip(actions, -1, 1).astype(np.float32),  # as the environment does
         achieved=np.stack(distances, axis=1) < GOAL_RADIUS,
+        snapshots=np.empty((len(observations), 0)),
     )

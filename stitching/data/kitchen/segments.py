@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,7 @@ class Episode:
     observations: np.ndarray  # (T + 1, 59) float32
     actions: np.ndarray  # (T, 9) float32
     achieved: np.ndarray  # (T + 1, 7) bool: which goals hold
+    snapshots: np.ndarray  # (T + 1, snapshot) float64; no columns where nobody simulated it
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,12 @@ def cut(episode: Episode, order: Order = ()) -> list[Segment]:
     if missed and start < len(episode.actions):
         segments.append(Segment(episode, start, len(episode.actions), missed[0], False))
     return segments
+
+
+def shown_orders(demonstrations: Iterable[Sequence[Segment]]) -> list[Order]:
+    """The distinct orders in which skills were accomplished, sorted."""
+    shown = {tuple(SKILLS[s.skill] for s in one if s.success) for one in demonstrations}
+    return sorted(shown - {()})
 
 
 def as_transitions(segments: Sequence[Segment]) -> Transitions:

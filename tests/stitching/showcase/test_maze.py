@@ -12,7 +12,7 @@ from stitching.data.transitions import Transitions
 from stitching.envs.maze import Maze
 from stitching.models.agent import Agent
 from stitching.rollout import Play, RolloutConfig, play_from_start
-from stitching.showcase import DEMONSTRATIONS, maze_showcase
+from stitching.showcase.maze import DEMONSTRATIONS, maze_showcase
 from stitching.stitchers import Stitcher
 
 TASK, STEP_LIMIT, CONFIG = ("a", "b", "d"), 40, RolloutConfig(sample_actions=True)

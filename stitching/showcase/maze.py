@@ -29,7 +29,9 @@ class PathRecorder:
     def __post_init__(self) -> None:
         self.positions.append(list(self.maze.spawn))
 
-    def step(self, block: EpisodeBlock, rows: np.ndarray, skill: int, phase: str) -> None:
+    def step(
+        self, block: EpisodeBlock, rows: np.ndarray, episodes: np.ndarray, skill: int, phase: str
+    ) -> None:
         self.positions.append([int(x) for x in block.snapshot(rows)[0]])
         self.phases.append(phase)
         self.skills.append(self.maze.skills[skill].name)

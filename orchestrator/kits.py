@@ -1,0 +1,91 @@
+"""What each benchmark brings along: its data's settings, its datasets, and what figures need."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from orchestrator.structure import Plain
+from stitching.data.kitchen.demonstrations import KitchenDataConfig, Order, orders
+from stitching.data.maze import MazeDataConfig
+from stitching.envs.kitchen import SKILLS
+
+DataConfig = MazeDataConfig | KitchenDataConfig
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """One artifact of transitions; dynamics are learned from all, skills from those that teach."""
+
+    kind: str
+    params: Plain = field(default_factory=dict)  # beside the data's settings and the root seed
+    teaches: bool = True
+
+
+@dataclass(frozen=True)
+class Illustration:
+    """Something to look at that no score depends on, made last and by seed 0's models."""
+
+    kind: str
+    inputs: tuple[str, ...]  # "agent", "dynamics", or roles of datasets and of `extras`
+
+
+@dataclass(frozen=True)
+class Kit:
+    data: type[DataConfig]
+    datasets: Callable[[Any], dict[str, Dataset]]  # by role, for these settings
+    extras: dict[str, str] = field(default_factory=dict)  # data not learned from: role → kind
+    illustrations: dict[str, Illustration] = field(default_factory=dict)  # by name
+    shown_task: tuple[str, ...] = ()  # in the showcase, where the spec has it
+
+
+def _maze_datasets(config: MazeDataConfig) -> dict[str, Dataset]:
+    return {
+        "demonstrations": Dataset("maze-demonstrations"),
+        "exploration": Dataset("maze-exploration", teaches=False),
+    }
+
+
+def _kitchen_datasets(config: KitchenDataConfig) -> dict[str, Dataset]:
+    """One artifact an order, so that they are collected in parallel."""
+    if config.source == "human":
+        return {"demonstrations": Dataset("kitchen-human", {"sha256": _sha256(config.human)})}
+    return {
+        f"demonstrations-{short_order(order)}": Dataset("kitchen-demonstrations", {"order": order})
+        for order in orders(config)
+    }
+
+
+def short_order(order: Order) -> str:
+    """ "microwave-bottom-hinge-slide": as the human orders are written."""
+    return "-".join(name.split()[0] for name in order)
+
+
+def _sha256(file: str) -> str:
+    """Of a local file, so that another content is another dataset; hub ids name one content."""
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest() if Path(file).is_file() else ""
+
+
+KITS: dict[str, Kit] = {
+    "maze": Kit(
+        MazeDataConfig,
+        _maze_datasets,
+        illustrations={
+            "showcase": Illustration("maze-showcase", ("agent", "dynamics", "demonstrations"))
+        },
+        shown_task=("g0", "g1", "g3", "g2"),  # the paper's Figure 1
+    ),
+    "kitchen": Kit(
+        KitchenDataConfig,
+        _kitchen_datasets,
+        extras={"held-out": "kitchen-held-out"},
+        illustrations={
+            "showcase": Illustration("kitchen-showcase", ("agent", "dynamics")),
+            "diagnosis": Illustration("kitchen-diagnosis", ("agent", "dynamics", "held-out")),
+        },
+        shown_task=(SKILLS[5], SKILLS[6], SKILLS[0], SKILLS[4]),
+    ),
+}

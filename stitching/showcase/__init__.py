@@ -1,0 +1,1 @@
+"""Recorded episodes for figures; no score depends on them."""
