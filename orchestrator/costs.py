@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 from orchestrator.jobs import BlockTask
-from orchestrator.ledger import Ledger
+from orchestrator.ledger import Ledger, Played
 from orchestrator.plan import Node, Plan
 from orchestrator.recipes import Recipe
 from orchestrator.store import CorruptArtifactError, Store
@@ -27,8 +27,13 @@ REFERENCE_SECONDS = {
     "mf-policy": 10.0,
     "dynamics": 15.0,
 }
-REFERENCE_SECONDS_PER_SEGMENT = 0.005
-BYTES_PER_SEGMENT = 120
+# By benchmark, for methods that plan and for others: a segment's seconds.
+REFERENCE_SEGMENT = {("maze", True): 0.005, ("maze", False): 0.003} | {
+    ("kitchen", True): 2.0,
+    ("kitchen", False): 0.2,
+}
+REFERENCE_SUCCESS = 1.0  # so that the estimate is an upper bound
+BYTES_PER_SEGMENT = {"maze": 120, "kitchen": 1300}
 
 Standing = Literal["found", "decided", "missing"]
 
@@ -40,6 +45,7 @@ class Estimate:
     artifacts: dict[str, tuple[int, int]]  # kind → found, missing
     blocks: dict[str, dict[Standing, int]]  # method ("" for first skills) → counts
     episodes: int  # of the finished tables: tasks × methods × seeds × episodes
+    segments_missing: int  # expected
     segments_in_tree: int
     segments_naive: int
     steps_in_tree: int  # environment steps if no episode ended early
@@ -51,27 +57,29 @@ class Estimate:
 
 
 def estimate(plan: Plan, store: Store, shared: Ledger) -> Estimate:
-    """Look at store and ledger; runs nothing. Evaluation is costed as if every skill succeeded."""
+    """Look at store and ledger; runs nothing.
+
+    How many episodes will survive to each block is what blocks like it have shown in this store;
+    where there were none, all are taken to survive.
+    """
     spec = plan.spec
     artifacts: dict[str, Counter[bool]] = {}
     training = 0.0
-    history = _training_history(store)
+    trained = _training_history(store)
     for key, recipe in plan.recipes.items():
         found = (recipe.kind, key) in store
         artifacts.setdefault(recipe.kind, Counter())[found] += 1
         if not found:
-            training += history.get(_size_class(recipe), REFERENCE_SECONDS[recipe.kind])
+            training += trained.get(_size_class(recipe), REFERENCE_SECONDS[recipe.kind])
 
-    rates = shared.seconds_per_segment()
+    history = shared.history()
     blocks: dict[str, Counter[Standing]] = {}
-    evaluation = 0.0
-    missing_segments = 0
-    for node, task, standing in standings(plan, shared):
-        blocks.setdefault(node.method, Counter())[standing] += 1
-        if standing == "missing":
-            segments = task.episodes[1] - task.episodes[0]
-            missing_segments += segments
-            evaluation += segments * rates.get(task.cost_name, REFERENCE_SECONDS_PER_SEGMENT)
+    evaluation = missing_segments = 0.0
+    for place in standings(plan, shared, history):
+        blocks.setdefault(place.node.method, Counter())[place.standing] += 1
+        if place.standing == "missing":
+            missing_segments += place.arriving
+            evaluation += place.arriving * _seconds_each(place.task, history)
 
     runs = len(spec.methods) * spec.seeds * spec.episodes
     naive_segments = sum(len(task) for task in spec.all_tasks) * runs
@@ -86,29 +94,54 @@ def estimate(plan: Plan, store: Store, shared: Ledger) -> Estimate:
         steps_naive=naive_steps,
         seconds_training=training,
         seconds_evaluation=evaluation,
-        disk_bytes=2 * BYTES_PER_SEGMENT * missing_segments,
-        from_history=bool(rates),
+        segments_missing=round(missing_segments),
+        disk_bytes=round(2 * BYTES_PER_SEGMENT[spec.benchmark] * missing_segments),
+        from_history=any(task.kind in history for task in plan.tasks.values()),
     )
 
 
-def standings(plan: Plan, shared: Ledger) -> Iterator[tuple[Node, BlockTask, Standing]]:
+@dataclass(frozen=True)
+class Place:
+    """A block of the tree, and what is known of it."""
+
+    node: Node
+    task: BlockTask
+    standing: Standing
+    arriving: float  # episodes expected to play it
+
+
+def standings(plan: Plan, shared: Ledger, history: Mapping[str, Played]) -> Iterator[Place]:
     """Every block of a plan, and whether it is there, not needed, or to be played.
 
     A block is decided without being played where no episode survived a block above it. What lies
     below a missing block counts as missing: it is, at most.
     """
-    for chunk in range(len(plan.chunks)):
-        waiting: list[tuple[Node, Standing | None]] = [(root, None) for root in plan.roots()]
+    for chunk, (first, end) in enumerate(plan.chunks):
+        waiting: list[tuple[Node, Standing | None, float]]
+        waiting = [(root, None, end - first) for root in plan.roots()]
         while waiting:
-            node, standing = waiting.pop()
+            node, standing, arriving = waiting.pop()
             task = plan.tasks[node, chunk]
             below = standing
             if standing is None:
                 outcome = next((outcome for _, outcome in shared.outcomes([task.key])), None)
                 standing = "missing" if outcome is None else "found"
                 below = "missing" if outcome is None else None if outcome.survivors else "decided"
-            yield node, task, standing
-            waiting.extend((child, below) for child in plan.children.get(node, []))
+            yield Place(node, task, standing, arriving)
+            surviving = arriving * _success_rate(task, history)
+            if standing == "found" and outcome is not None:
+                surviving = outcome.survivors
+            waiting.extend((child, below, surviving) for child in plan.children.get(node, []))
+
+
+def _success_rate(task: BlockTask, history: Mapping[str, Played]) -> float:
+    return history[task.kind].success_rate if task.kind in history else REFERENCE_SUCCESS
+
+
+def _seconds_each(task: BlockTask, history: Mapping[str, Played]) -> float:
+    if task.kind in history:
+        return history[task.kind].seconds_each
+    return REFERENCE_SEGMENT[task.benchmark, task.method == "mb-stitch"]
 
 
 def _steps_in_tree(plan: Plan) -> int:

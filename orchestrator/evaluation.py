@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from orchestrator.executors.protocol import Executor
 from orchestrator.jobs import ATTEMPTS, BlockReport, BlockTask, PlayJob, Report
-from orchestrator.ledger import Ledger, Outcome
+from orchestrator.ledger import Ledger, Outcome, Played
 from orchestrator.plan import Node, Plan
 from orchestrator.progress import Progress
 from orchestrator.store import Store
@@ -122,22 +122,24 @@ class Evaluation:
         self.ledger.record(done)
         self.shared.record(done)
         self._finished |= {key for key, _ in done}
-        self._remember_costs(report.job, report.blocks)
+        self._remember(report.job, report.blocks)
         for block in report.blocks:
             if block.outcome is None:
                 self._failed(block.key, block.error, single=True)
             else:
                 self._expand(*self._place[block.key])
 
-    def _remember_costs(self, job: PlayJob, reports: Iterable[BlockReport]) -> None:
-        blocks = {report.key: report for report in reports}
-        costs: dict[str, tuple[int, float]] = {}
-        for task, _ in job.tasks:
-            segments, seconds = costs.get(task.cost_name, (0, 0.0))
-            block = blocks[task.key]
-            costs[task.cost_name] = segments + block.segments, seconds + block.seconds
-        for name, (segments, seconds) in costs.items():
-            self.shared.add_cost(name, segments, seconds)
+    def _remember(self, job: PlayJob, reports: Iterable[BlockReport]) -> None:
+        kinds = {task.key: task.kind for task, _ in job.tasks}
+        sums: dict[str, Played] = {}
+        for block in reports:
+            if block.outcome is not None:
+                successes = Outcome.from_bytes(block.outcome).survivors
+                played = Played(block.segments, successes, block.seconds)
+                kind = kinds[block.key]
+                sums[kind] = sums[kind] + played if kind in sums else played
+        for kind, played in sums.items():
+            self.shared.add_played(kind, played)
 
     def _failed(self, key: str, error: str, *, single: bool) -> None:
         """Count a failure and queue the block again, or give it up after three attempts.

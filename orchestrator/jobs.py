@@ -42,9 +42,9 @@ class BlockTask:
     configs: Plain  # kind → how it was trained, where loading it needs to know
 
     @property
-    def cost_name(self) -> str:
-        """What segments of this kind are called where their cost is remembered."""
-        return f"{self.benchmark} {self.method or 'first skill'}"
+    def kind(self) -> str:
+        """What segments like this one's are called where it is remembered how they went."""
+        return f"{self.benchmark}, {self.method or 'any method'}, skill {len(self.prefix)}"
 
     @property
     def name(self) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from orchestrator.errors import UsageError
 from orchestrator.structure import Plain
 from stitching.data.kitchen.demonstrations import KitchenDataConfig, Order, orders
 from stitching.data.maze import MazeDataConfig
@@ -40,6 +41,7 @@ class Kit:
     extras: dict[str, str] = field(default_factory=dict)  # data not learned from: role → kind
     illustrations: dict[str, Illustration] = field(default_factory=dict)  # by name
     shown_task: tuple[str, ...] = ()  # in the showcase, where the spec has it
+    label: Callable[[Any], str] = lambda config: ""  # of unusual data; every table shows it
 
 
 def _maze_datasets(config: MazeDataConfig) -> dict[str, Dataset]:
@@ -52,11 +54,25 @@ def _maze_datasets(config: MazeDataConfig) -> dict[str, Dataset]:
 def _kitchen_datasets(config: KitchenDataConfig) -> dict[str, Dataset]:
     """One artifact an order, so that they are collected in parallel."""
     if config.source == "human":
+        if config.human.endswith(".npz") and not Path(config.human).is_file():
+            raise UsageError(f"data.human: no file {config.human}")
+        if not config.human:
+            raise UsageError(
+                "data.human: name an .npz file or a Minari dataset, as D4RL/kitchen/complete-v2"
+            )
         return {"demonstrations": Dataset("kitchen-human", {"sha256": _sha256(config.human)})}
     return {
         f"demonstrations-{short_order(order)}": Dataset("kitchen-demonstrations", {"order": order})
         for order in orders(config)
     }
+
+
+def _kitchen_label(config: KitchenDataConfig) -> str:
+    return {
+        "orders": "",
+        "single-skill": "data: each skill alone, from the start pose",
+        "human": f"data: people's demonstrations, {Path(config.human).name}",
+    }[config.source]
 
 
 def short_order(order: Order) -> str:
@@ -86,6 +102,7 @@ KITS: dict[str, Kit] = {
             "showcase": Illustration("kitchen-showcase", ("agent", "dynamics")),
             "diagnosis": Illustration("kitchen-diagnosis", ("agent", "dynamics", "held-out")),
         },
+        label=_kitchen_label,
         shown_task=(SKILLS[5], SKILLS[6], SKILLS[0], SKILLS[4]),
     ),
 }

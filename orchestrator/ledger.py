@@ -25,8 +25,9 @@ CREATE TABLE IF NOT EXISTS artifacts (
 CREATE TABLE IF NOT EXISTS failures (
     key TEXT NOT NULL, attempt INTEGER NOT NULL, error TEXT NOT NULL, PRIMARY KEY (key, attempt)
 );
-CREATE TABLE IF NOT EXISTS costs (
-    name TEXT PRIMARY KEY, segments INTEGER NOT NULL, seconds REAL NOT NULL
+CREATE TABLE IF NOT EXISTS played (
+    name TEXT PRIMARY KEY, segments INTEGER NOT NULL, successes INTEGER NOT NULL,
+    seconds REAL NOT NULL
 ) WITHOUT ROWID;
 """
 
@@ -49,6 +50,30 @@ class Outcome:
     @staticmethod
     def from_bytes(data: bytes) -> Outcome:
         return Outcome(load(data))
+
+
+@dataclass(frozen=True)
+class Played:
+    """What segments of one kind took and came to."""
+
+    segments: int
+    successes: int
+    seconds: float  # of one worker
+
+    @property
+    def seconds_each(self) -> float:
+        return self.seconds / self.segments
+
+    @property
+    def success_rate(self) -> float:
+        return self.successes / self.segments
+
+    def __add__(self, other: Played) -> Played:
+        return Played(
+            self.segments + other.segments,
+            self.successes + other.successes,
+            self.seconds + other.seconds,
+        )
 
 
 class Ledger:
@@ -160,18 +185,20 @@ class Ledger:
         with self._storage_errors():
             self._db.execute("VACUUM")
 
-    def add_cost(self, name: str, segments: int, seconds: float) -> None:
-        """Remember what playing segments of a kind took, for later estimates."""
+    def add_played(self, name: str, played: Played) -> None:
+        """Remember how playing segments of a kind went, for later estimates."""
         with self._transaction():
             self._db.execute(
-                "INSERT INTO costs VALUES (?, ?, ?) ON CONFLICT (name) DO UPDATE SET "
-                "segments = segments + excluded.segments, seconds = seconds + excluded.seconds",
-                (name, segments, seconds),
+                "INSERT INTO played VALUES (?, ?, ?, ?) ON CONFLICT (name) DO UPDATE SET "
+                "segments = segments + excluded.segments, "
+                "successes = successes + excluded.successes, seconds = seconds + excluded.seconds",
+                (name, played.segments, played.successes, played.seconds),
             )
 
-    def seconds_per_segment(self) -> dict[str, float]:
-        rows = self._db.execute("SELECT name, seconds / segments FROM costs WHERE segments > 0")
-        return dict(rows)
+    def history(self) -> dict[str, Played]:
+        """All that was ever played, by kind of segment."""
+        rows = self._db.execute("SELECT * FROM played WHERE segments > 0")
+        return {name: Played(*counts) for name, *counts in rows}
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:

@@ -15,10 +15,11 @@ from typing import Any
 
 import analysis
 from orchestrator.errors import ChangedError, LockedError, UsageError
+from orchestrator.kits import KITS
 from orchestrator.ledger import Ledger
 from orchestrator.methods import method_label
 from orchestrator.provenance import matters
-from orchestrator.spec import Spec, differences, spec_from_plain
+from orchestrator.spec import Spec, TableSpec, differences, spec_from_plain
 from orchestrator.store import storage_errors, write_atomically
 from orchestrator.structure import Plain, to_plain
 
@@ -154,9 +155,15 @@ def describe(spec: Spec) -> Plain:
         "episodes": spec.episodes,
         "tasks": [">".join(task) for task in spec.all_tasks],
         "step_limits": {str(length): limit for length, limit in spec.step_limits.items()},
-        "tables": [to_plain(table) for table in spec.tables],
+        "tables": [to_plain(table) | _title(spec, table) for table in spec.tables],
         "spec": to_plain(spec),
     }
+
+
+def _title(spec: Spec, table: TableSpec) -> Plain:
+    """A table's title, which names its data where they are not the benchmark's usual ones."""
+    label = KITS[spec.benchmark].label(spec.data)
+    return {"title": f"{table.title or spec.title} ({label})"} if label else {}
 
 
 def default_out(spec: Spec) -> Path:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -103,6 +104,11 @@ class MBStitch:
     execute: int  # actions of each plan that are carried out: all in the maze, 1 under CEM
     limit: int
 
+    @cached_property
+    def _critic(self) -> Agent:
+        """The agent as plans are judged by it: as precise as what they are imagined with."""
+        return self.agent.at_precision(self.dynamics.precision)
+
     def propose(
         self,
         states: Tensor,
@@ -132,11 +138,9 @@ class MBStitch:
 
     def _imagine(self, starts: Tensor, sequences: Tensor, following: int) -> Tensor:
         """Eq. 2 after each sequence: (n, observation), (n, horizon, action) → (n,)."""
-        imagined = starts.unsqueeze(0)
-        for step in range(sequences.shape[1]):
-            imagined = self.dynamics(imagined, sequences[:, step])  # (D, n, observation)
+        imagined = self.dynamics.imagine(starts, sequences)  # (D, n, observation)
         return conservative_value(
-            self.agent.values(imagined.mean(dim=0), following),  # (M, n)
+            self._critic.values(imagined.mean(dim=0), following),  # (M, n)
             self.dynamics.scaled(imagined),
             self.alpha,
             self.beta,

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 import torch
 from torch import Tensor
 
 from stitching.envs.protocol import ActionSpace
 from stitching.models.iql import LOG_STD_RANGE
-from stitching.models.layers import mlp, parameters
+from stitching.models.layers import Precision, at_precision, mlp, parameters
 
 
 class Agent:
@@ -24,6 +26,12 @@ class Agent:
         self._log_std = self._policy.pop("log_std").clamp(*LOG_STD_RANGE)
         self._v = parameters(weights, "v")
         self._actions = actions
+
+    def at_precision(self, precision: Precision) -> Agent:
+        """The same agent with values computed in that precision (but for their last layer)."""
+        other = copy(self)
+        other._v = at_precision(self._v, precision)
+        return other
 
     def _inputs(self, states: Tensor, condition: int) -> Tensor:
         conditions = self._conditions[condition].expand(len(states), -1)

@@ -38,7 +38,8 @@ class Dynamics:
         self._mean = torch.from_numpy(weights["observation_mean"])
         self._std = torch.from_numpy(weights["observation_std"])
         self._params = at_precision(parameters(weights, "t"), config.precision, output=True)
-        self._config = config
+        self._activation = config.activation
+        self.precision = config.precision
 
     def scaled(self, states: Tensor) -> Tensor:
         """States in units of the data's standard deviation, per dimension."""
@@ -46,11 +47,23 @@ class Dynamics:
 
     def __call__(self, states: Tensor, actions: Tensor) -> Tensor:
         """Next states: (D or 1, n, observation), (n, action) → (D, n, observation)."""
-        inputs = (states - self._mean) / self._std
-        inputs = torch.cat([inputs, actions.expand(len(inputs), -1, -1)], dim=-1)
+        return states + self._change((states - self._mean) / self._std, actions) * self._std
+
+    def imagine(self, states: Tensor, sequences: Tensor) -> Tensor:
+        """States after whole sequences: (n, observation), (n, horizon, action) → (D, n, …).
+
+        The same as one step after another, but normalised once.
+        """
+        scaled = ((states - self._mean) / self._std).unsqueeze(0)
+        for actions in sequences.unbind(dim=1):
+            scaled = scaled + self._change(scaled, actions)
+        return scaled * self._std + self._mean
+
+    def _change(self, scaled: Tensor, actions: Tensor) -> Tensor:
+        """Change of state in units of its scale: (D or 1, n, observation) → (D, n, observation)."""
+        inputs = torch.cat([scaled, actions.expand(len(scaled), -1, -1)], dim=-1)
         members = self._params["w0"].shape[0]
-        change = mlp(self._params, inputs.expand(members, -1, -1), self._config.activation)
-        return states + change * self._std
+        return mlp(self._params, inputs.expand(members, -1, -1), self._activation)
 
 
 def train_dynamics(data: Transitions, config: DynamicsConfig, *labels: str | int) -> Trained:

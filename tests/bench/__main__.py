@@ -1,6 +1,7 @@
 """`make bench`: the ratios that the documentation quotes, each within one run.
 
-    python -m tests.bench [iql planner outside tree speedup scheduling] [--run DIR] [--json FILE]
+    python -m tests.bench [iql planner reference outside tree speedup scheduling]
+                          [--run DIR] [--json FILE]
 
 Read the ratios, not the numbers behind them, which belong to the machine.
 """
@@ -17,11 +18,18 @@ from typing import Annotated, Literal
 import tyro
 
 from orchestrator.worker import use_one_thread
-from tests.bench import bench_iql, bench_planner, bench_run, bench_scheduling, bench_speedup
+from tests.bench import (
+    bench_iql,
+    bench_planner,
+    bench_reference_planner,
+    bench_run,
+    bench_scheduling,
+    bench_speedup,
+)
 from tests.bench.result import HEADER, Result
 
-Name = Literal["iql", "planner", "outside", "tree", "speedup", "scheduling"]
-ALL: tuple[Name, ...] = ("iql", "planner", "outside", "tree", "speedup", "scheduling")
+Name = Literal["iql", "planner", "reference", "outside", "tree", "speedup", "scheduling"]
+ALL: tuple[Name, ...] = ("iql", "planner", "reference", "outside", "tree", "speedup", "scheduling")
 
 
 def main(
@@ -33,12 +41,14 @@ def main(
 
     Args:
         names: what to measure.
-        run: a finished run directory for `outside` and `tree`; else a quick run is made.
+        run: a finished run directory for `outside` and `tree`; else a quick run is made. One of
+            Kitchen lends `reference` its models; they are untrained else.
         json_: where to write the same as JSON.
     """
     benches: dict[Name, Callable[[], Iterator[Result]]] = {
         "iql": bench_iql.measure,
         "planner": bench_planner.measure,
+        "reference": partial(bench_reference_planner.measure, run),
         "outside": partial(bench_run.outside, run),
         "tree": partial(bench_run.tree, run),
         "speedup": bench_speedup.measure,

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from orchestrator.costs import estimate, standings
-from orchestrator.ledger import Ledger, Outcome
+from orchestrator.ledger import Ledger, Outcome, Played
 from orchestrator.plan import Node, Plan, make_plan
 from orchestrator.printing import plan_lines
 from orchestrator.spec import Spec
@@ -52,7 +52,8 @@ def test_what_nobody_survived_to_is_decided(plan: Plan, shared: Ledger) -> None:
     dead, alive = (Node(0, "", (skill,)) for skill in plan.spec.skill_names[:2])
     finish(shared, plan, dead, survivors=0)
     finish(shared, plan, alive, survivors=1)
-    standing = {(node, task.key): s for node, task, s in standings(plan, shared)}
+    places = standings(plan, shared, {})
+    standing = {(place.node, place.task.key): place.standing for place in places}
     assert len(standing) == len(plan.tasks)
     for (node, _), state in standing.items():
         below_dead = node.seed == 0 and node.prefix[0] == dead.prefix[0]
@@ -76,12 +77,24 @@ def test_found_artifacts_cost_nothing(plan: Plan, shared: Ledger, tmp_path: Path
 
 
 def test_times_come_from_this_stores_history(plan: Plan, shared: Ledger, tmp_path: Path) -> None:
-    names = {task.cost_name for task in plan.tasks.values()}
-    for name in names:
-        shared.add_cost(name, segments=10, seconds=20.0)
+    for kind in {task.kind for task in plan.tasks.values()}:
+        shared.add_played(kind, Played(segments=10, successes=10, seconds=20.0))
     costs = estimate(plan, Store(tmp_path), shared)
     assert costs.from_history
     assert costs.seconds_evaluation == pytest.approx(2.0 * costs.segments_in_tree)
+
+
+def test_survivors_are_expected_as_they_were_before(
+    plan: Plan, shared: Ledger, tmp_path: Path
+) -> None:
+    """Half survive each skill: half of the second skills are played."""
+    for kind in {task.kind for task in plan.tasks.values()}:
+        shared.add_played(kind, Played(segments=10, successes=5, seconds=10.0))
+    first = sum(node.parent is None for node in plan.nodes)
+    second = len(plan.nodes) - first
+    costs = estimate(plan, Store(tmp_path), shared)
+    assert costs.segments_missing == plan.spec.episodes * (first + second / 2)
+    assert costs.seconds_evaluation == pytest.approx(costs.segments_missing)
 
 
 def test_the_plan_is_printed_for_a_person(plan: Plan, shared: Ledger, tmp_path: Path) -> None:

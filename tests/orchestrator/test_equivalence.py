@@ -92,7 +92,7 @@ def test_blocks_taken_over_from_a_smaller_run(
     out, lines = done.root / "deep", Lines()
     carry_out(deep, serially(out, done.store_root), lines)
     assert lines.phases["training"] == (8, 8)
-    assert lines.phases["showcase"] == (1, 0)  # it shows a longer task
+    assert lines.phases["illustrations"] == (1, 0)  # it shows a longer task
     assert promised_bytes(out) == expected
 
 

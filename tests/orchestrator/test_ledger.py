@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from orchestrator.errors import IncompleteError, NondeterminismError, StorageError
-from orchestrator.ledger import Ledger, Outcome
+from orchestrator.ledger import Ledger, Outcome, Played
 
 
 @pytest.fixture
@@ -139,11 +139,12 @@ def test_failures_are_counted_across_sessions(ledger: Ledger) -> None:
     again.close()
 
 
-def test_costs_add_up(ledger: Ledger) -> None:
-    ledger.add_cost("maze first skill", 10, 1.0)
-    ledger.add_cost("maze first skill", 30, 1.0)
-    ledger.add_cost("maze mb-stitch", 0, 0.0)  # every block of it failed
-    assert ledger.seconds_per_segment() == {"maze first skill": 0.05}
+def test_history_adds_up(ledger: Ledger) -> None:
+    ledger.add_played("first skills", Played(10, 8, 1.0))
+    ledger.add_played("first skills", Played(30, 12, 1.0))
+    assert ledger.history() == {"first skills": Played(40, 20, 2.0)}
+    assert ledger.history()["first skills"].seconds_each == 0.05
+    assert ledger.history()["first skills"].success_rate == 0.5
 
 
 def test_forgotten_blocks_give_their_space_back(ledger: Ledger) -> None:

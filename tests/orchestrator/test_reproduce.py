@@ -23,7 +23,7 @@ def test_everything_is_done_once(spec: Spec, plan: Plan, place: Place, counted: 
     assert lines.phases == {
         "training": (len(plan.needed), 0),
         "evaluation": (len(plan.tasks), 0),
-        "showcase": (1, 0),
+        "illustrations": (1, 0),
     }
     assert directory.finished
     segments = pd.read_parquet(directory.path / "segments.parquet")

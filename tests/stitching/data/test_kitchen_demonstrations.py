@@ -8,8 +8,9 @@ import pytest
 from stitching.data.kitchen.demonstrations import (
     KitchenDataConfig,
     collect,
+    held_out,
     human_orders,
-    single_skill,
+    orders,
 )
 from stitching.data.kitchen.rates import RatesConfig, success_rates, summary
 from stitching.data.transitions import DataError, Transitions, check, concatenate
@@ -95,8 +96,27 @@ def test_another_seed_gives_other_demonstrations(short: Transitions) -> None:
     assert not same_bytes(collect(replace(CONFIG, episodes=2), SHORT_ORDERS, seed=1), short)
 
 
+def test_every_source_has_its_orders() -> None:
+    assert orders(CONFIG) == human_orders()
+    assert orders(replace(CONFIG, source="single-skill")) == tuple((name,) for name in SKILLS)
+
+
+def test_held_out_skills_begin_where_their_snapshots_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    config = replace(CONFIG, episodes=2, held_out=1, source="single-skill")
+    alone = ("kettle",), ("microwave",)
+    monkeypatch.setattr("stitching.data.kitchen.demonstrations.orders", lambda config: alone)
+    data, starts = held_out(config, seed=0)
+    assert [SKILLS[skill] for skill in data.episode_skills] == ["kettle", "microwave"]
+    block = KITCHEN.block()
+    block.restore(starts, [np.random.default_rng(0), np.random.default_rng(1)])
+    first = data.observations[data.episode_starts]
+    assert np.array_equal(block.observe(np.arange(2)), first)
+    seen = collect(config, [("kettle",)], seed=0)
+    assert not (seen.observations == first[0]).all(axis=1).any()
+
+
 def test_single_skills_start_from_the_start_pose() -> None:
-    single = single_skill(CONFIG, seed=0, names=("kettle", "microwave"))
+    single = collect(CONFIG, [("kettle",), ("microwave",)], seed=0)
     starts = single.observations[single.episode_starts]
     assert np.abs(starts[0] - starts[1]).max() < 0.02  # noise alone
     assert [SKILLS[skill] for skill in single.episode_skills] == ["kettle", "microwave"]

@@ -3,15 +3,24 @@
 from pathlib import Path
 from types import SimpleNamespace
 
+import minari
 import numpy as np
 import pytest
+from gymnasium.spaces import Box, Dict
+from minari.data_collector import EpisodeBuffer
 
-from stitching.data.kitchen.human import human_data, minari_recordings, npz_recordings
+from stitching.data.kitchen.human import (
+    human_data,
+    human_demonstrations,
+    minari_recordings,
+    npz_recordings,
+)
 from stitching.data.kitchen.segments import Episode, cut
 from stitching.data.transitions import DataError, check
 from stitching.envs.kitchen import KITCHEN, SKILLS
 
-REAL = Path("/work/shared/data/kitchen_complete_v2_minari.npz")
+SHARED = Path(__file__).resolve().parents[4] / "shared"
+REAL = SHARED / "data/kitchen_complete_v2_minari.npz"
 
 
 def episode(steps: int, **achieved: tuple[int, ...]) -> Episode:
@@ -20,7 +29,7 @@ def episode(steps: int, **achieved: tuple[int, ...]) -> Episode:
     for word, states in achieved.items():
         skill = next(i for i, name in enumerate(SKILLS) if name.startswith(word))
         holds[list(states), skill] = True
-    return Episode(np.zeros((steps + 1, 59)), np.zeros((steps, 9)), holds)
+    return Episode(np.zeros((steps + 1, 59)), np.zeros((steps, 9)), holds, np.zeros((steps + 1, 0)))
 
 
 def cuts(shown: Episode, order: tuple[str, ...] = ()) -> list[tuple[str, int, int, bool]]:
@@ -67,6 +76,38 @@ def test_minari_episodes() -> None:
     observations, actions = recording()
     shown = SimpleNamespace(observations={"observation": observations}, actions=actions)
     assert len(human_data(minari_recordings([shown]))) == 2
+
+
+def test_a_local_minari_dataset(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Written and found by Minari itself, by its id."""
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    observations, actions = recording()
+    flags = np.zeros(len(actions), dtype=bool)
+    buffer = EpisodeBuffer(
+        observations={"observation": observations},
+        actions=actions,
+        rewards=np.zeros(len(actions)),
+        terminations=flags,
+        truncations=np.r_[flags[1:], True],
+    )
+    minari.create_dataset_from_buffers(
+        "kitchen/tiny-v0",
+        [buffer],
+        observation_space=Dict({"observation": Box(-np.inf, np.inf, (59,))}),
+        action_space=Box(-1, 1, (9,)),
+    )
+    (shown,) = human_demonstrations("kitchen/tiny-v0")
+    assert [(SKILLS[s.skill], s.success) for s in shown] == [("microwave", True)]
+
+
+def test_an_unknown_source_of_recordings_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    with pytest.raises(DataError, match=r"no file .*gone\.npz"):
+        human_demonstrations(str(tmp_path / "gone.npz"))
+    with pytest.raises(DataError, match="no Minari dataset 'kitchen/gone-v0'"):
+        human_demonstrations("kitchen/gone-v0")
 
 
 @pytest.mark.parametrize("last", [True, False], ids=["one-more", "as-many"])

@@ -1,0 +1,93 @@
+"""What benchmarks bring along: datasets by source, and labels of unusual data."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator.builders import BUILDERS
+from orchestrator.errors import UsageError
+from orchestrator.kits import KITS
+from orchestrator.plan import Plan, make_plan
+from orchestrator.rundir import describe
+from orchestrator.spec import Spec, load_spec
+from stitching.data.kitchen.demonstrations import KitchenDataConfig
+from stitching.envs.kitchen import SKILLS
+
+
+@pytest.fixture(scope="module")
+def spec() -> Spec:
+    return load_spec("table2", "quick")
+
+
+@pytest.fixture(scope="module")
+def plan(spec: Spec) -> Plan:
+    return make_plan(spec)
+
+
+def test_every_kind_of_every_kit_can_be_made() -> None:
+    configs = {"maze": KITS["maze"].data(), "kitchen": KitchenDataConfig()}
+    for name, kit in KITS.items():
+        kinds = {one.kind for one in kit.datasets(configs[name]).values()}
+        kinds |= {one.kind for one in kit.illustrations.values()} | set(kit.extras.values())
+        assert kinds <= BUILDERS.keys()
+
+
+def test_table2_is_the_papers_protocol() -> None:
+    spec = load_spec("table2")
+    lengths = [len(task) for task in spec.all_tasks]
+    assert [lengths.count(n) for n in (2, 3, 4)] == [42, 210, 840]
+    assert (spec.episodes, spec.seeds, len(spec.methods)) == (100, 3, 4)
+    assert spec.step_limits == {2: 250, 3: 360, 4: 480}
+    # No shorter limit can bind before the skills' own, so all lengths share one tree exactly.
+    assert all(limit >= n * spec.rollout.skill_limit for n, limit in spec.step_limits.items())
+    cem = spec.mb_stitch.cem
+    assert (cem.population, cem.elites, cem.horizon, cem.iterations) == (50, 10, 5, 500)
+    assert (cem.momentum, cem.temperature, cem.temperature_discount) == (0.9, 0.5, 0.99)
+    assert (spec.mb_stitch.alpha, spec.mb_stitch.beta, spec.mb_stitch.execute) == (7.0, 5.0, 1)
+    assert spec.dynamics.activation == "elu"
+
+
+def test_kitchen_data_are_collected_an_order_at_a_time(plan: Plan) -> None:
+    assert len(plan.datasets) == 24
+    agent = plan.recipes[plan.agents[0]]
+    assert agent.inputs == plan.datasets == plan.recipes[plan.dynamics[0]].inputs
+    orders = [tuple(plan.recipes[key].params["order"]) for key in plan.datasets.values()]
+    assert len(set(orders)) == 24
+
+
+def test_nothing_is_trained_on_held_out_data(plan: Plan) -> None:
+    held_out = {key for key, recipe in plan.recipes.items() if recipe.kind == "kitchen-held-out"}
+    assert len(held_out) == 1
+    assert not held_out & plan.needed
+
+
+def test_other_sources_are_other_data_and_say_so(spec: Spec) -> None:
+    single = replace(spec, data=KitchenDataConfig(source="single-skill"))
+    assert list(make_plan(single).datasets) == [
+        f"demonstrations-{name.split()[0]}" for name in SKILLS
+    ]
+    titles = [table["title"] for table in describe(single)["tables"]]
+    assert all(title.endswith("(data: each skill alone, from the start pose)") for title in titles)
+    assert not any("data:" in table["title"] for table in describe(spec)["tables"])
+
+
+def test_people_s_data_are_named_by_their_content(spec: Spec, tmp_path: Path) -> None:
+    def dataset(content: int) -> str:
+        file = tmp_path / "mine.npz"
+        np.savez(file, observations=np.full((3, 59), content))
+        config = KitchenDataConfig(source="human", human=str(file))
+        return make_plan(replace(spec, data=config)).datasets["demonstrations"]
+
+    assert dataset(1) == dataset(1) != dataset(2)
+
+
+@pytest.mark.parametrize(
+    ("human", "complaint"),
+    [("", "name an .npz file or a Minari dataset"), ("gone.npz", "no file gone.npz")],
+)
+def test_people_s_data_must_be_named(spec: Spec, human: str, complaint: str) -> None:
+    config = KitchenDataConfig(source="human", human=human)
+    with pytest.raises(UsageError, match=complaint):
+        make_plan(replace(spec, data=config))
