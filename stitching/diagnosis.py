@@ -77,6 +77,9 @@ def _root_mean_square(numbers: torch.Tensor) -> float:
 
 
 def _rank_correlation(first: Any, second: Any) -> float:
+    """Spearman's; 0 where one of them is constant."""
+    if np.ptp(first) == 0 or np.ptp(second) == 0:
+        return 0.0
     return float(spearmanr(first, second).statistic)
 
 

@@ -23,6 +23,7 @@ are a Kitchen run's where `--run` is given one, else untrained.
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
@@ -273,7 +274,11 @@ def _compared(models: str, ours: Tally, title: str, theirs: Tally) -> Iterator[R
 
 def _setting(run: Path | None) -> Setting:
     spec = load_spec("table2")
-    trained = run is not None and RunDirectory(run).spec().benchmark == spec.benchmark
+    # Of the run's spec the benchmark alone, for older code may have written it.
+    trained = (
+        run is not None
+        and json.loads((run / "spec.json").read_text())["benchmark"] == spec.benchmark
+    )
     if run is not None and trained:
         models, config, data = _of_run(run)
         blocks = [_skill_ends(data, spec.block_episodes, number) for number in range(BLOCKS)]

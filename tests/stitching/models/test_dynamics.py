@@ -10,7 +10,7 @@ from stitching.data.maze import MazeDataConfig, exploration
 from stitching.data.transitions import Transitions
 from stitching.envs.maze import MAZE, MOVES
 from stitching.models.dynamics import Dynamics, DynamicsConfig, train_dynamics
-from stitching.models.layers import init_mlp, prefixed
+from stitching.models.layers import Precision, init_mlp, prefixed
 from stitching.models.scale import observation_scale
 from stitching.streams import stream
 
@@ -222,3 +222,19 @@ def test_bad_data_stop_training(column: str) -> None:
     data.columns()[column][::3] = np.nan
     with pytest.raises(FloatingPointError, match="prediction_loss is nan at update 10"):
         train_dynamics(data, TINY, "x")
+
+
+@pytest.mark.parametrize("precision", ["float32", "bfloat16"])
+def test_imagined_sequences_are_one_step_after_another(precision: Precision) -> None:
+    config = replace(TINY, precision=precision)
+    model = Dynamics(train_dynamics(explored(), config, "maze").weights, config)
+    states = seen_from(np.argwhere(MAZE.free)[:6])
+    moves = stream("moves").integers(len(MOVES), size=(6, 5))
+    sequences = torch.eye(len(MOVES))[torch.from_numpy(moves)]
+    stepwise = states.unsqueeze(0)
+    for actions in sequences.unbind(dim=1):
+        stepwise = model(stepwise, actions)
+    imagined = model.imagine(states, sequences)
+    assert imagined.shape == (TINY.members, 6, MAZE.observation_size)
+    tolerance = 1e-5 if precision == "float32" else 1e-2
+    torch.testing.assert_close(imagined, stepwise, rtol=tolerance, atol=tolerance)

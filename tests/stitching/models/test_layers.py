@@ -9,7 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import kstest
 
-from stitching.models.layers import Params, init_mlp, mlp, parameters, prefixed
+from stitching.models.layers import (
+    Params,
+    at_precision,
+    init_mlp,
+    mlp,
+    parameters,
+    prefixed,
+)
 from stitching.streams import stream
 
 PLAIN = {
@@ -186,3 +193,30 @@ def test_prefixed_takes_trained_parameters() -> None:
     array = prefixed(params, "v")["v.w0"]
     assert isinstance(array, np.ndarray)
     np.testing.assert_array_equal(array, params["w0"].detach().numpy())
+
+
+@pytest.mark.parametrize("output", [False, True])
+def test_half_precision_is_off_by_its_rounding_alone(output: bool) -> None:
+    params = init_mlp(3, [66, 192, 192, 1], stream("wide"))
+    inputs = torch.from_numpy(stream("inputs").standard_normal((3, 64, 66), dtype=np.float32))
+    exact = mlp(params, inputs)
+    layers = at_precision(params, "bfloat16", output=output)
+    assert layers["w0"].dtype == torch.bfloat16
+    assert layers["w2"].dtype == (torch.bfloat16 if output else torch.float32)
+    half = mlp(layers, inputs)
+    assert half.dtype == torch.float32
+    assert 0 < (half - exact).abs().max() < 2**-7 * exact.abs().max()
+
+
+def test_full_precision_changes_nothing() -> None:
+    params = init_mlp(2, [5, 7, 3], stream("small"))
+    layers = at_precision(params, "float32")
+    assert all(layers[name] is weight for name, weight in params.items())
+
+
+def test_half_precision_trains_the_full_weights() -> None:
+    params = init_mlp(1, [5, 7, 3], stream("small"))
+    for weight in params.values():
+        weight.requires_grad_()
+    mlp(at_precision(params, "bfloat16"), torch.ones(4, 5)).square().sum().backward()
+    assert all(w.grad is not None and w.grad.dtype == torch.float32 for w in params.values())
