@@ -10,12 +10,16 @@ from typing import Any
 import pandas as pd
 
 from analysis.figures import Drawn
+from analysis.page_studies import models_section, pairs_section
 from analysis.page_tables import claims_html, gains_html, html_table, scores_html
 from analysis.run import Run
 from analysis.skills import permutation_scores, single_skill_rates
 from analysis.tables import Table
 from analysis.verdicts import EXPLANATION, error_reading
 from analysis.writers import describe, seed_note
+
+OF_MODELS = ("diagnosis", "diagnosis-values")
+"""Figures that stand beside what they are about, and not with those of the whole run."""
 
 PERMUTATION_COLUMNS: list[dict[str, Any]] = [
     {"title": "Task", "digits": None},
@@ -30,7 +34,12 @@ PERMUTATION_COLUMNS: list[dict[str, Any]] = [
 
 
 def render_page(
-    run: Run, episodes: pd.DataFrame, tables: list[Table], drawn: list[Drawn], figures: Path
+    run: Run,
+    episodes: pd.DataFrame,
+    tables: list[Table],
+    studies: dict[str, pd.DataFrame],
+    drawn: list[Drawn],
+    figures: Path,
 ) -> str:
     """The whole page; `figures` is the folder the figures were drawn into."""
     sections = {
@@ -41,7 +50,17 @@ def render_page(
         },
         "figures": (
             "Figures",
-            "".join(_figure(figure, figures) for figure in drawn if not figure.table),
+            "".join(
+                _figure(figure, figures)
+                for figure in drawn
+                if not figure.table and figure.name not in OF_MODELS
+            ),
+        ),
+        "pairs": ("Pairs of skills", pairs_section(run, studies.get("pair-groups"))),
+        "models": (
+            "Are the models right?",
+            models_section(run, studies.get("models"))
+            + "".join(_figure(figure, figures) for figure in drawn if figure.name in OF_MODELS),
         ),
         "skills": ("Single skills", _single_skills(run)),
         "every-task": ("Every permutation", _permutation_section(run)),
@@ -124,6 +143,8 @@ def _table_section(table: Table, drawn: list[Drawn], figures: Path) -> str:
 
 
 def _figure(figure: Drawn, folder: Path) -> str:
+    if figure.missing:
+        return f'<p class="note">{escape(figure.missing)}</p>'
     # As an image of its own, an SVG's element ids cannot clash with another's.
     data = base64.b64encode((folder / f"{figure.name}.svg").read_bytes()).decode("ascii")
     caption = escape(figure.caption)

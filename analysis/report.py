@@ -2,16 +2,23 @@
 
 import json
 import shutil
+from collections.abc import Iterable
 from pathlib import Path
+
+import pandas as pd
 
 from analysis.episodes import write_episodes
 from analysis.figures import Drawn, draw_figures
 from analysis.files import replaced_folder
+from analysis.models import model_table
 from analysis.page import render_page
-from analysis.run import load_run
+from analysis.pairs import pair_groups, pair_table, second_skills, shown_orders
+from analysis.run import Run, load_run
 from analysis.skills import permutation_scores
 from analysis.tables import Table, build_table
 from analysis.writers import to_csv, to_latex, to_markdown
+
+Studies = dict[str, pd.DataFrame]
 
 
 def build_report(run_dir: Path) -> Path:
@@ -30,40 +37,44 @@ def export_results(run_dir: Path, results_dir: Path) -> list[Path]:
     Each takes the place of an older one in one step, and nothing of that one stays. Rebuilds the
     report first: what is kept can then not be older than the run.
     """
-    tables, drawn = _build(run_dir)
+    tables, studies, drawn = _build(run_dir)
     report = run_dir / "report"
     folders = []
     for table in tables:
         name = table.entry.id
         folder = results_dir / name
         with replaced_folder(folder) as draft:
-            _copy_table(name, report, drawn, draft)
+            _copy_table(name, report, studies, drawn, draft)
             provenance = json.dumps(load_run(run_dir).provenance, indent=2, ensure_ascii=False)
             _write(draft / "provenance.json", provenance + "\n")
         folders.append(folder)
     return folders
 
 
-def _copy_table(name: str, report: Path, drawn: list[Drawn], folder: Path) -> None:
+def _copy_table(
+    name: str, report: Path, studies: Iterable[str], drawn: list[Drawn], folder: Path
+) -> None:
     for source, target in {
         f"{name}.csv": "scores.csv",
         f"{name}-gains.csv": "gains.csv",
         f"{name}.md": "table.md",
         f"{name}.tex": "table.tex",
+        **{f"{study}.csv": f"{study}.csv" for study in studies},
     }.items():
         shutil.copyfile(report / source, folder / target)
     (folder / "figures").mkdir()
     for figure in drawn:
-        if figure.table in ("", name):
+        if figure.table in ("", name) and not figure.missing:
             for suffix in ("svg", "png"):
                 file = f"figures/{figure.name}.{suffix}"
                 shutil.copyfile(report / file, folder / file)
 
 
-def _build(run_dir: Path) -> tuple[list[Table], list[Drawn]]:
+def _build(run_dir: Path) -> tuple[list[Table], Studies, list[Drawn]]:
     run = load_run(run_dir)
     episodes = write_episodes(run_dir)
     tables = [build_table(episodes, run.spec, entry) for entry in run.spec.tables]
+    studies = _studies(run)
     with replaced_folder(run_dir / "report") as report:
         drawn = draw_figures(run, tables, report / "figures")
         for table in tables:
@@ -73,9 +84,24 @@ def _build(run_dir: Path) -> tuple[list[Table], list[Drawn]]:
             _write(report / f"{name}.csv", to_csv(table.scores))
             _write(report / f"{name}-gains.csv", to_csv(table.gains))
         _write(report / "permutations.csv", to_csv(permutation_scores(episodes, run.spec)))
-        page = render_page(run, episodes, tables, drawn, report / "figures")
+        for name, study in studies.items():
+            _write(report / f"{name}.csv", to_csv(study))
+        page = render_page(run, episodes, tables, studies, drawn, report / "figures")
         _write(report / "index.html", page)
-    return tables, drawn
+    return tables, studies, drawn
+
+
+def _studies(run: Run) -> Studies:
+    """What is known beside the tables, by the name of its file; empty for most benchmarks."""
+    studies = {}
+    orders = shown_orders(run.datasets)
+    seconds = second_skills(run.segments, run.spec)
+    if orders is not None and not seconds.empty:
+        studies["pairs"] = pair_table(seconds, orders, run.spec)
+        studies["pair-groups"] = pair_groups(seconds, orders, run.spec)
+    if run.diagnosis:
+        studies["models"] = model_table(run)
+    return studies
 
 
 def _write(path: Path, text: str) -> None:

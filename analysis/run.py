@@ -109,6 +109,8 @@ class Run:
     quarantine: list[dict[str, Any]]
     training: list[dict[str, Any]]
     showcase: dict[str, Any]
+    datasets: list[dict[str, Any]]
+    diagnosis: dict[str, Any]
 
 
 def load_run(run_dir: Path) -> Run:
@@ -129,6 +131,8 @@ def load_run(run_dir: Path) -> Run:
         quarantine=_read_json(run_dir / "quarantine.json", []),
         training=_read_json(run_dir / "training.json", []),
         showcase=_read_json(run_dir / "showcase.json", {}),
+        datasets=_read_json(run_dir / "datasets.json", []),
+        diagnosis=_read_json(run_dir / "diagnosis.json", {}),
     )
 
 

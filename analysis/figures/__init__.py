@@ -3,22 +3,32 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from analysis.figures.curves import draw_curves
+from analysis.figures.diagnosis import draw_predictions, draw_value_curves
+from analysis.figures.frames import NoPictureError, render_frames
+from analysis.figures.kitchen import draw_sheet, draw_values, sheet_steps
 from analysis.figures.maze import draw_showcase
 from analysis.figures.pairs import draw_pairs
 from analysis.figures.scores import draw_scores
 from analysis.figures.style import house_style, save
+from analysis.pairs import shown_orders, shown_pairs
 from analysis.run import Run
 from analysis.tables import Table
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """A figure on disk: <name>.svg and <name>.png, and what it shows, in words."""
+    """A figure on disk: <name>.svg and <name>.png, and what it shows, in words.
+
+    Where it could not be drawn `missing` says why, and there are no files.
+    """
 
     name: str
     caption: str
     table: str  # id of the table it belongs to, "" if to the whole run
+    missing: str = ""
 
 
 def draw_figures(run: Run, tables: list[Table], folder: Path) -> list[Drawn]:
@@ -34,12 +44,14 @@ def draw_figures(run: Run, tables: list[Table], folder: Path) -> list[Drawn]:
             )
             drawn.append(Drawn(name, caption, table.entry.id))
         if run.showcase:
-            save(draw_showcase(run.showcase, run.spec.methods), folder, "showcase")
-            drawn.append(Drawn("showcase", SHOWCASE_CAPTION, ""))
+            drawn += SHOWCASES[run.showcase.get("benchmark", "maze")](run, folder)
         pair = _first_and_last_method(run)
         if pair:
-            save(draw_pairs(run.segments, run.spec, pair), folder, "pairs")
-            drawn.append(Drawn("pairs", PAIRS_CAPTION, ""))
+            shown = shown_pairs(shown_orders(run.datasets) or [])
+            framed = sorted(pair for pair in shown if {*pair} <= {*run.spec.skills})
+            save(draw_pairs(run.segments, run.spec, pair, framed), folder, "pairs")
+            drawn.append(Drawn("pairs", PAIRS_CAPTION + (FRAMED if framed else ""), ""))
+        drawn += _diagnosis(run, folder)
         if run.training:
             save(draw_curves(run.training), folder, "curves")
             drawn.append(Drawn("curves", "Training, one line for each trained model.", ""))
@@ -53,6 +65,72 @@ SHOWCASE_CAPTION = (
 PAIRS_CAPTION = (
     "How often the second skill succeeds once the first has, by ordered pair, over all seeds."
 )
+FRAMED = " Framed: pairs that occur in the data, one right after the other."
+VALUES_CAPTION = (
+    "The same episode by both methods: the value of the skill in charge (background), ensemble "
+    "mean ± spread over its members. The line breaks where the next skill's value takes over; "
+    "stitching is hatched and red."
+)
+SHEET_CAPTION = (
+    "The episode above under {method}: frames at equal steps, and every stitch's first and last "
+    "step, framed in red."
+)
+PREDICTIONS_CAPTION = (
+    "Predictions of the dynamics on held-out demonstrations. Left: root mean square error over "
+    "the distance moved; 1 (dashed) is no better than predicting that nothing moves. Right: the "
+    "ensemble's disagreement against its mean's error, in standard deviations of the data; ρ is "
+    "the rank correlation."
+)
+VALUE_CURVES_CAPTION = (
+    "Value along held-out demonstrations, one thin line each; thick their mean, with the "
+    "ensemble's mean spread. ρ is the rank correlation of value with time, averaged over them."
+)
+
+
+def _maze_showcase(run: Run, folder: Path) -> list[Drawn]:
+    save(draw_showcase(run.showcase, run.spec.methods), folder, "showcase")
+    return [Drawn("showcase", SHOWCASE_CAPTION, "")]
+
+
+def _kitchen_showcase(run: Run, folder: Path) -> list[Drawn]:
+    save(draw_values(run.showcase, run.spec), folder, "stitch-values")
+    values = Drawn("stitch-values", f"{VALUES_CAPTION} {_which_episode(run)}", "")
+    episode = run.showcase["episodes"][-1]
+    steps = sheet_steps(episode)
+    try:
+        frames = render_frames(np.array(episode["positions"])[steps])
+    except NoPictureError as error:
+        return [values, Drawn("contact-sheet", "", "", f"no contact sheet: {error}")]
+    save(draw_sheet(episode, steps, frames, run.spec), folder, "contact-sheet", image_dpi=144)
+    method = run.spec.methods.get(episode["method"], episode["method"])
+    return [values, Drawn("contact-sheet", SHEET_CAPTION.format(method=method), "")]
+
+
+def _which_episode(run: Run) -> str:
+    """How the shown episode was chosen, as `stitching.showcase.kitchen` does."""
+    showcase = run.showcase
+    names = [episode["method"] for episode in showcase["episodes"]]
+    first, last = (run.spec.methods.get(name, name) for name in (names[0], names[-1]))
+    scores = [showcase["accomplished_by_all"][name] for name in (names[0], names[-1])]
+    better = sum(b > a for a, b in zip(*scores, strict=True))
+    played = f"{run.spec.task_label(showcase['task'])}, {showcase['of_episodes']} episodes played"
+    if not better:
+        return f"{played}: {last} accomplishes more than {first} in none; the first is shown."
+    return f"{played}: {last} accomplishes more than {first} in {better}; the first of them."
+
+
+SHOWCASES = {"maze": _maze_showcase, "kitchen": _kitchen_showcase}
+
+
+def _diagnosis(run: Run, folder: Path) -> list[Drawn]:
+    drawn = []
+    if run.diagnosis.get("predictions"):
+        save(draw_predictions(run.diagnosis["predictions"]), folder, "diagnosis")
+        drawn.append(Drawn("diagnosis", PREDICTIONS_CAPTION, ""))
+    if run.diagnosis.get("values"):
+        save(draw_value_curves(run.diagnosis["values"], run.spec), folder, "diagnosis-values")
+        drawn.append(Drawn("diagnosis-values", VALUE_CURVES_CAPTION, ""))
+    return drawn
 
 
 def _first_and_last_method(run: Run) -> tuple[str, str] | None:

@@ -1,25 +1,38 @@
 """Which second skill works after which first: one matrix a method."""
 
+from collections.abc import Collection
+
 import numpy as np
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 
 from analysis.figures.style import INK, new_figure
+from analysis.pairs import second_skills
 from analysis.run import SEPARATOR, RunSpec
+
+FRAME = "#FF3D8B"  # apart from every colour of the map
 
 
 def pair_rates(segments: pd.DataFrame, spec: RunSpec, method: str) -> np.ndarray:
     """(first, second) success rate of the second skill given the first's; NaN if never tried."""
-    limit = spec.step_limits.get(2, np.inf)
-    seconds = segments[(segments["depth"] == 2) & (segments["method"] == method)]
-    success = seconds["success"].astype(bool) & (seconds["end_step"] <= limit)
-    rates = success.groupby(seconds["prefix"]).mean()
+    seconds = second_skills(segments, spec)
+    rates = seconds[seconds["method"] == method].groupby("task")["success"].mean()
     pairs = [[SEPARATOR.join((first, second)) for second in spec.skills] for first in spec.skills]
     return np.array([[rates.get(pair, np.nan) for pair in row] for row in pairs], dtype=float)
 
 
-def draw_pairs(segments: pd.DataFrame, spec: RunSpec, methods: tuple[str, str]) -> Figure:
-    """Two matrices side by side, rows the first skill, columns the second."""
+def draw_pairs(
+    segments: pd.DataFrame,
+    spec: RunSpec,
+    methods: tuple[str, str],
+    framed: Collection[tuple[str, str]] = (),
+) -> Figure:
+    """Two matrices side by side, rows the first skill, columns the second.
+
+    `framed` are the pairs (first, second) to put a frame around.
+    """
     names = [spec.skill_label(skill) for skill in spec.skills]
     size = 1.3 + 0.46 * len(names)
     figure = new_figure(2 * size + 1.2, size + 0.6)
@@ -32,6 +45,7 @@ def draw_pairs(segments: pd.DataFrame, spec: RunSpec, methods: tuple[str, str]) 
             text = "" if np.isnan(rate) else f"{rate:.2f}"
             axes.text(column, row, text, ha="center", va="center", fontsize=7.5,
                       color="white" if dark else INK)  # fmt: skip
+        _frame(axes, spec, framed)
         axes.set_title(spec.methods[method])
         axes.set_xticks(range(len(names)), names)
         if max(map(len, names)) > 4:
@@ -46,3 +60,10 @@ def draw_pairs(segments: pd.DataFrame, spec: RunSpec, methods: tuple[str, str]) 
     bar = figure.colorbar(image, ax=panels, shrink=0.8, label="success of the second skill")
     bar.outline.set_visible(False)
     return figure
+
+
+def _frame(axes: Axes, spec: RunSpec, pairs: Collection[tuple[str, str]]) -> None:
+    """A line inside each pair's cell."""
+    for first, second in pairs:
+        corner = spec.skills.index(second) - 0.44, spec.skills.index(first) - 0.44
+        axes.add_patch(Rectangle(corner, 0.88, 0.88, fill=False, ec=FRAME, lw=2))

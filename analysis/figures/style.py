@@ -45,8 +45,12 @@ def new_figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def save(figure: Figure, folder: Path, name: str) -> None:
-    """Writes <name>.svg and <name>.png; the same figure gives the same bytes."""
+def save(figure: Figure, folder: Path, name: str, image_dpi: int = 100) -> None:
+    """Writes <name>.svg and <name>.png; the same figure gives the same bytes.
+
+    `image_dpi` is the resolution of pictures inside the SVG.
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    figure.savefig(folder / f"{name}.svg", metadata={"Date": None, "Creator": None})
+    metadata = {"Date": None, "Creator": None}
+    figure.savefig(folder / f"{name}.svg", dpi=image_dpi, metadata=metadata)
     figure.savefig(folder / f"{name}.png", dpi=144, metadata={"Software": None})

@@ -40,8 +40,10 @@ class IQLConfig:
     expectile: float = 0.7
     temperature: float = 0.5
     members: int = 5
-    width: int = 64
+    width: int = 64  # of the critics' hidden layers
     hidden_layers: int = 2
+    policy_width: int = 0  # of the policy's; 0: as the critics
+    policy_layers: int = 0
     precision: Precision = "float32"  # of the hidden layers while training
     log_every: int = 500
 
@@ -129,7 +131,8 @@ def train_iql(
     init = stream("init", *labels)
     q = init_mlp(2 * config.members, [state + actions.size, *hidden, 1], init)
     v = init_mlp(config.members, [state, *hidden, 1], init)
-    policy = init_mlp(1, [state, *hidden, actions.size], init)
+    width, layers = config.policy_width or config.width, config.policy_layers or len(hidden)
+    policy = init_mlp(1, [state, *[width] * layers, actions.size], init)
     log_std = torch.zeros(actions.size)
     q_target = {name: weight.clone() for name, weight in q.items()}
 

@@ -47,7 +47,7 @@ def test_the_page_says_what_the_files_say(tmp_path: Path, write_run: Any) -> Non
     page = build_report(write_kitchen(write_run, tmp_path / "run")).read_text(encoding="utf-8")
     assert "Pairs of skills" in page
     assert "Are the models right?" in page
-    assert "pairs in the data (3)" in page
+    assert "pairs in the data (3)" in page.replace("\N{NO-BREAK SPACE}", " ")
     assert "97 of 100" in page
     assert "Framed: pairs that occur in the data" in page
     assert "MB-Stitch accomplishes more than No-Stitch in 8" in page

@@ -1,0 +1,161 @@
+"""Sections of the page about pairs of skills and about the models behind the scores."""
+
+import math
+from html import escape
+
+import pandas as pd
+
+from analysis.page_tables import html_table
+from analysis.pairs import BASELINE, shown_orders
+from analysis.run import Run
+from analysis.writers import Record
+
+UNKNOWN = "–"
+
+
+def pairs_section(run: Run, groups: pd.DataFrame | None) -> str:
+    """Second skills by group of pairs and method; nothing where the data show no orders."""
+    if groups is None:
+        return ""
+    baseline = run.spec.methods.get(BASELINE, BASELINE)
+    lines = [
+        [
+            _unbroken(f"{row['group']} ({row['pairs']})"),
+            run.spec.methods[row["method"]],
+            f"{row['successes']:,} of {row['trials']:,}",
+            _unbroken(f"{row['rate']:.3f} [{row['ci_low']:.3f}, {row['ci_high']:.3f}]"),
+            _gain(row),
+        ]
+        for row in groups.to_dict("records")
+    ]
+    header = ["Pairs", "Method", "Second skill succeeds", "Rate", f"Gain over {baseline}"]
+    return _note(
+        "How often the second skill succeeds once the first has. A pair is in the data if its "
+        "skills follow one another in some demonstration. In rates and gains every pair weighs "
+        "the same, and every seed, so a rate may differ a little from successes over trials. "
+        f"Methods share their first skills; gains over {baseline} are paired by seed, pair and "
+        "episode. 95 % intervals are from resampling seeds, then pairs, then episodes."
+    ) + html_table(header, lines)
+
+
+def _gain(row: Record) -> str:
+    if math.isnan(row["gain"]):
+        return UNKNOWN
+    return _unbroken(f"{row['gain']:+.3f} [{row['gain_low']:+.3f}, {row['gain_high']:+.3f}]")
+
+
+def _unbroken(text: str) -> str:
+    return text.replace(" ", "\N{NO-BREAK SPACE}")
+
+
+def models_section(run: Run, models: pd.DataFrame | None) -> str:
+    """Policies and values by skill, dynamics by group; nothing without a diagnosis."""
+    if models is None:
+        return ""
+    known: Known = {(row["measure"], row["of"]): row for row in models.to_dict("records")}
+    return _skills(run, known) + _dynamics(run, known)
+
+
+Known = dict[tuple[str, str], Record]
+
+
+def _skills(run: Run, known: Known) -> str:
+    starting = {order[0] for order in shown_orders(run.datasets) or [] if order}
+    lines = [
+        [
+            run.spec.skill_label(skill),
+            _rate(known.get(("competence", skill))),
+            _rate(known.get(("from start pose", skill))) + (" *" if skill in starting else ""),
+            _rate(known.get(("after other skills", skill))),
+            _correlation(known.get(("value rank correlation", skill))),
+            _auc(known.get(("auc", skill))),
+        ]
+        for skill in run.spec.skills
+    ]
+    header = [
+        "Skill", "From its own starts", "From the start pose", "After other skills",
+        "Value rises (ρ)", "Value tells (AUC)",
+    ]  # fmt: skip
+    baseline = run.spec.methods.get(BASELINE, BASELINE)
+    return (
+        "<h3>Policies and values</h3>"
+        + html_table(header, lines)
+        + _note(
+            "Successes of trials, with Wilson's 95 % interval, which takes trials as independent. "
+            f"Own starts are where the skill's held-out demonstrations begin{_starts(run)}; the "
+            f"start pose is that of an episode{' (*: in the data)' if starting else ''}; after "
+            f"other skills is {baseline}, over all pairs. ρ: rank correlation of value with time "
+            "along held-out demonstrations. AUC: how likely the value at the end of the preceding "
+            f"skill is higher where the policy then succeeded than where it failed, under "
+            f"{baseline}, compared within each seed, ties counted half; 0.5 tells nothing. In "
+            "parentheses: how often it succeeded and failed. Own starts and ρ are of the first "
+            "seed's models, the rest is over all seeds."
+        )
+    )
+
+
+def _starts(run: Run) -> str:
+    """ " (12 to 15 of each skill)", where the diagnosis counts them."""
+    competence = run.diagnosis.get("competence", {}).values()
+    counts = [study["starts"] for study in competence if "starts" in study]
+    return f" ({min(counts)} to {max(counts)} of each skill)" if counts else ""
+
+
+def _rate(row: Record | None) -> str:
+    if row is None or not row["trials"]:
+        return UNKNOWN
+    interval = _unbroken(f"[{row['ci_low']:.2f}, {row['ci_high']:.2f}]")
+    return f"{row['successes']} of {row['trials']} {interval}"
+
+
+def _correlation(row: Record | None) -> str:
+    if row is None or math.isnan(row["value"]):
+        return UNKNOWN
+    return f"{row['value']:+.2f} (n = {row['trials']})"
+
+
+def _auc(row: Record | None) -> str:
+    if row is None:
+        return UNKNOWN
+    counts = f"({row['successes']} + {row['trials'] - row['successes']})"
+    return f"{UNKNOWN if math.isnan(row['value']) else format(row['value'], '.2f')} {counts}"
+
+
+def _dynamics(run: Run, known: Known) -> str:
+    predictions = run.diagnosis.get("predictions", {})
+    if not predictions:
+        return ""
+    groups = dict.fromkeys(group for study in predictions.values() for group in study["groups"])
+    lines = [
+        [
+            group,
+            *(
+                f"{known[f'relative error after {steps}', group]['value']:.3f} "
+                f"({known[f'rmse error after {steps}', group]['value']:.3f})"
+                for steps in predictions
+            ),
+        ]
+        for group in groups
+    ]
+    lines.append(
+        ["disagreement and error (ρ)"]
+        + [f"{study['disagreement_rank_correlation']:+.2f}" for study in predictions.values()]
+    )
+    states = next(iter(predictions.values()))["states"]
+    return (
+        "<h3>Dynamics</h3>"
+        + html_table(
+            ["Numbers of the state", *(f"after {s} step{'s'[: s != '1']}" for s in predictions)],
+            lines,
+        )
+        + _note(
+            "Root mean square error of the ensemble's mean over the distance moved, in parentheses "
+            f"in standard deviations of the training data; open loop, from {states:,} states of "
+            "held-out demonstrations. 1 is no better than predicting that nothing moves. ρ: rank "
+            "correlation of the members' disagreement with the error. Of the first seed's models."
+        )
+    )
+
+
+def _note(text: str) -> str:
+    return f'<p class="note">{escape(text)}</p>'
