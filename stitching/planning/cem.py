@@ -12,6 +12,9 @@ from stitching.planning.protocol import Plan, Score
 from stitching.planning.ranking import rankable
 
 
+SMALLEST = 1e-3  # share of the weights that not the best elite has, below which it is alone
+
+
 @dataclass(frozen=True)
 class CEM:
     """Fits a Gaussian over action sequences to its own best samples until it has converged.
@@ -22,19 +25,20 @@ class CEM:
         E   = the `elites` samples of highest score
         w_i ∝ exp(score_i / τ_t),  i ∈ E             τ_t = temperature · temperature_discount^t
         μ   ← momentum · μ + (1 − momentum) · Σ w_i a_i
-        σ   ← momentum · σ + (1 − momentum) · √(Σ w_i (a_i − Σ w_j a_j)²)
+        σ   ← momentum · σ + (1 − momentum) · √(Σ w_i (a_i − Σ w_j a_j)² / (1 − Σ w_i²))
 
     until every σ of the problem is below `tolerance`, or for `iterations` rounds. The plan is the
     final mean μ, of which the paper executes the first action.
 
     The defaults are Table 7's for Kitchen.
 
-    Two readings of Table 7 are ours. It names an "annealing temperature" without a formula: here
+    Three readings of Table 7 are ours. It names an "annealing temperature" without a formula: here
     it divides the scores, as in simulated annealing, so that elites count almost equally at first
     and the best one alone at last. (TD-MPC, a likely ancestor, multiplies: exp(τ · score). With
-    τ_t falling that would end at equal weights.) And its "until convergence" has no threshold: at
-    the Kitchen setting with random models (six problems), 500 iterations brought the largest σ to
-    about 0.01; stopping at 0.05 took a third fewer and kept 98 to 99 % of the gain in score.
+    τ_t falling that would end at equal weights.) And its "until convergence" has no threshold:
+    with trained Kitchen models (twelve problems) stopping at 0.05 took 310 of the 500 iterations
+    and kept 96 % of the gain in score; at 0.1, 234 and 90 %. The elites' spread is the unbiased
+    one, without which σ falls too early: ten elites spread some 5 % less than what they are of.
     """
 
     population: int = 50  # action sequences sampled an iteration
@@ -97,4 +101,6 @@ class CEM:
         weights = ((elite_scores - elite_scores[:, :1]) / tau).softmax(dim=1)[:, :, None, None]
         mean = (weights * elites).sum(dim=1)
         variance = (weights * (elites - mean[:, None]).square()).sum(dim=1)
-        return mean, variance.sqrt()
+        # With equal weights, n / (n − 1); where one elite has all the weight there is no spread.
+        unbiased = variance / (1 - weights.square().sum(dim=1)).clamp(min=SMALLEST)
+        return mean, unbiased.sqrt()

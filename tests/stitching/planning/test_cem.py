@@ -51,6 +51,7 @@ def plain_cem(
         weights /= weights.sum()
         elite_mean = sum(w * a for w, a in zip(weights, elites, strict=True))
         variance = sum(w * (a - elite_mean) ** 2 for w, a in zip(weights, elites, strict=True))
+        variance /= max(1 - sum(w**2 for w in weights), 1e-3)
         mean = planner.momentum * mean + (1 - planner.momentum) * elite_mean
         std = planner.momentum * std + (1 - planner.momentum) * np.sqrt(variance)
         if std.max() < planner.tolerance:
