@@ -45,8 +45,8 @@ class KitchenDataConfig:
     source: Source = "orders"  # several skills in human orders, each alone, or people's recordings
     human: str = ""  # for people's: a Minari id such as D4RL/kitchen/complete-v2, or an .npz file
     episodes: int = 24  # demonstrations an order
-    held_out: int = 9  # more of each order, to judge models by
-    quality: float = 0.8  # of the hand: from 1, a steady expert, down to 0
+    held_out: int = 8  # more of each order, to judge models by
+    quality: float = 0.9  # of the hand: from 1, a steady expert, down to 0
     skill_steps: int = 160  # after which a skill counts as missed and the demonstration ends
     return_home: bool = False  # to the start posture before another skill; people do not
     keep_failures: bool = False  # keep the segment of a missed skill, as one without success
@@ -134,8 +134,8 @@ def _achieved(block: KitchenBlock, rows: np.ndarray) -> np.ndarray:
 
 
 def orders(config: KitchenDataConfig) -> tuple[Order, ...]:
-    """What the scripted demonstrators of a source are asked to do."""
-    return human_orders() if config.source == "orders" else tuple((name,) for name in SKILLS)
+    """What scripted demonstrators are asked to do; beside people's data, what judges models."""
+    return tuple((name,) for name in SKILLS) if config.source == "single-skill" else human_orders()
 
 
 def play(

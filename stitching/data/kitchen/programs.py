@@ -101,7 +101,7 @@ class Style:
 
     jitter: float  # m, standard deviation of a loose waypoint
     slowest: float  # least factor on the programs' speeds; the greatest is 1.1
-    pause: float  # probability of a pause at a waypoint
+    pause: float  # probability of a pause at a waypoint in the air
     noise: float  # standard deviation of the action's noise
 
 
@@ -140,7 +140,7 @@ def perform(
         for waypoint in program.waypoints:
             jitter = style.jitter * waypoint.loose * rng.standard_normal(3)
             yield from _pass(arm, origin + waypoint.offset + jitter, waypoint, pace)
-            if rng.random() < style.pause:
+            if waypoint.loose == 1 and rng.random() < style.pause:  # in the air, not in touch
                 for _ in range(rng.integers(1, 6)):
                     yield arm.bend(np.zeros_like(HOME), waypoint.grip)
 
