@@ -1,4 +1,4 @@
-"""The front door: `skillstitch plan | run | status | report | compare | doctor | gc`."""
+"""The front door: `skillstitch plan | run | sweep | status | report | …`."""
 
 from __future__ import annotations
 
@@ -30,6 +30,7 @@ class PlanCommand:
     spec: OfSpec
     store: Path = Path("runs/store")  # where artifacts and finished blocks are kept
     workers: int | None = None  # to estimate the time for; default: all cores
+    from_sweep: str | None = None  # take a finished sweep's winner: its name or directory
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,7 @@ class RunCommand:
     address: str | None = None  # of a Ray cluster to join, e.g. 10.0.0.1:6379 or auto
     tracking_uri: str | None = None  # MLflow; default: SQLite beside the store; none: off
     results: Path | None = None  # also export each table to RESULTS/<table>/
+    from_sweep: str | None = None  # take a finished sweep's winner: its name or directory
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -93,14 +95,25 @@ def _with_spec(command: type[Any], name: str, words: list[str]) -> Any:
             words = [packaged_specs()[0], "--help"]
         else:
             raise UsageError(f"skillstitch {name} needs a spec: {', '.join(packaged_specs())}")
-    scale: Any = "paper"
-    for word, following in zip(words, [*words[1:], ""], strict=True):
-        if word == "--scale":
-            scale = following
-        elif word.startswith("--scale="):
-            scale = word.partition("=")[2]
-    default = command(load_spec(words[0], scale))
+    scale: Any = _option(words, "--scale") or "paper"
+    spec = load_spec(words[0], scale)
+    if sweep := _option(words, "--from-sweep"):
+        from sweeps.winner import with_winner
+
+        spec = with_winner(spec, sweep)
+    default = command(spec)
     return tyro.cli(command, default=default, args=words[1:], prog=program)
+
+
+def _option(words: list[str], name: str) -> str:
+    """The value of an option that decides the defaults of all others."""
+    value = ""
+    for word, following in zip(words, [*words[1:], ""], strict=True):
+        if word == name:
+            value = following
+        elif word.startswith(f"{name}="):
+            value = word.partition("=")[2]
+    return value
 
 
 def _plan(words: list[str]) -> None:
@@ -147,6 +160,12 @@ def _run(words: list[str]) -> None:
         OUTPUT.print(line, markup=False)
     if incomplete is not None:
         raise incomplete
+
+
+def _sweep(words: list[str]) -> None:
+    from sweeps.command import sweep
+
+    sweep(words, OUTPUT, ERRORS)
 
 
 def _export(run: Path, results: Path) -> None:
@@ -277,6 +296,7 @@ def _gc(words: list[str]) -> None:
 COMMANDS: dict[str, tuple[Callable[[list[str]], None], str]] = {
     "plan": (_plan, "what a spec would train and simulate, and what that costs"),
     "run": (_run, "carry a spec out, or resume it; ends with tables and report"),
+    "sweep": (_sweep, "search over a spec's fields, or resume it; ends with its winner"),
     "status": (_status, "how far a run directory is"),
     "report": (_report, "write a run's report again, and export its tables"),
     "compare": (_compare, "two runs side by side, paired"),

@@ -13,7 +13,10 @@ from orchestrator.plan import Node, Plan
 from orchestrator.progress import Progress
 from orchestrator.store import Store
 
-LARGEST_BUNDLE = 64  # blocks sent to a worker at once
+# Blocks sent to a worker at once: few enough that little is lost with it, enough to keep it busy.
+LARGEST_BUNDLE = 64
+BUNDLE_SECONDS = 5.0
+UNKNOWN_SECONDS = 0.1  # of a segment, where none like it was ever played over this store
 
 
 @dataclass
@@ -29,6 +32,7 @@ class Evaluation:
     seconds: float = 0.0  # that workers were busy playing
     _ready: deque[tuple[Node, int]] = field(default_factory=deque)
     _in_flight: int = 0
+    _history: dict[str, Played] = field(default_factory=dict)
     _attempts: dict[str, int] = field(default_factory=dict)  # failed ones, of this command
     _given_up: set[str] = field(default_factory=set)
     _alone: set[str] = field(default_factory=set)  # blocks whose worker died: to be sent singly
@@ -38,6 +42,7 @@ class Evaluation:
         self.progress.phase("evaluation", len(self.plan.tasks), 0)
         self._place = {task.key: place for place, task in self.plan.tasks.items()}
         self._adopt()
+        self._history = self.shared.history()
         for root in self.plan.roots():
             for chunk in range(len(self.plan.chunks)):
                 self._expand(root, chunk)
@@ -91,14 +96,23 @@ class Evaluation:
         while self._ready and self._in_flight < wanted:
             size = max(1, min(LARGEST_BUNDLE, len(self._ready) // wanted))
             bundle = [self._with_parent(*self._ready.popleft())]
+            seconds = self._expected_seconds(*bundle[0])
             while (
                 bundle[0][0].key not in self._alone
                 and len(bundle) < size
+                and seconds < BUNDLE_SECONDS
                 and self._next_key() not in self._alone
             ):
                 bundle.append(self._with_parent(*self._ready.popleft()))
+                seconds += self._expected_seconds(*bundle[-1])
             self.executor.submit(PlayJob(tuple(bundle)))
             self._in_flight += 1
+
+    def _expected_seconds(self, task: BlockTask, parent: Outcome | None) -> float:
+        first, end = task.episodes
+        segments = end - first if parent is None else parent.survivors
+        played = self._history.get(task.kind)
+        return segments * (UNKNOWN_SECONDS if played is None else played.seconds_each)
 
     def _next_key(self) -> str:
         return self.plan.tasks[self._ready[0]].key
@@ -140,6 +154,8 @@ class Evaluation:
                 sums[kind] = sums[kind] + played if kind in sums else played
         for kind, played in sums.items():
             self.shared.add_played(kind, played)
+            known = self._history.get(kind)
+            self._history[kind] = played if known is None else known + played
 
     def _failed(self, key: str, error: str, *, single: bool) -> None:
         """Count a failure and queue the block again, or give it up after three attempts.

@@ -25,7 +25,7 @@ from orchestrator.methods import (
     method_name,
     parse_method,
 )
-from orchestrator.structure import Plain, structure, to_plain
+from orchestrator.structure import Plain, merged, nested, structure, to_plain
 from stitching.envs.registry import BENCHMARKS
 from stitching.models.dynamics import DynamicsConfig
 from stitching.models.iql import IQLConfig
@@ -44,6 +44,7 @@ class TableSpec:
     rows: str = "length"  # how tasks are grouped into rows: length, last_skill, task
     title: str = ""
     noun: str = "skills"  # what a row label counts
+    baseline: str = ""  # gains of all others over this method; default: of the last over all others
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,10 @@ class Spec:
         return max(self.step_limits.values())
 
     def method_config(self, method: str) -> MethodConfig:
-        """The configuration of `name` or `name[field=value,…]`; UsageError lists what is valid."""
+        """The configuration of `name` or `name[field=value,…]`; UsageError lists what is valid.
+
+        Fields of fields are joined by dots: mb-stitch[alpha=5,cem.horizon=3].
+        """
         name, overrides = parse_method(method)
         settings: dict[str, Plain] = {
             "no-stitch": {},
@@ -99,7 +103,8 @@ class Spec:
             "mf-stitch": to_plain(self.mf_stitch),
             "mb-stitch": to_plain(self.mb_stitch),
         }
-        return structure(METHODS[name].config, settings[name] | overrides, f"method {method}")
+        config = merged(settings[name], nested(overrides))
+        return structure(METHODS[name].config, config, f"method {method}")
 
 
 def check_spec(spec: Spec) -> None:
@@ -126,6 +131,8 @@ def check_spec(spec: Spec) -> None:
             )
         if ids.count(table.id) > 1:
             raise UsageError(f"{where}: two tables have the id {table.id!r}")
+        if table.baseline and table.baseline not in spec.methods:
+            raise UsageError(f"{where}, table {table.id}: the baseline is none of its methods")
 
 
 def _check_numbers(plain: Any, where: str) -> None:
@@ -212,7 +219,7 @@ def load_spec(name_or_file: str, scale: Scale = "paper") -> Spec:
     scales = {"paper": {}} | scales
     if scale not in scales:
         raise UsageError(f"{where}: no scale {scale!r}; it has {', '.join(scales)}")
-    return spec_from_plain(_merged(content, scales[scale]) | {"scale": scale}, where)
+    return spec_from_plain(merged(content, scales[scale]) | {"scale": scale}, where)
 
 
 def spec_from_plain(content: Plain, where: str) -> Spec:
@@ -240,11 +247,3 @@ def _differences(old: Any, new: Any, path: str) -> list[str]:
             for line in _differences(old.get(key), new.get(key), f"{path}.{key}".lstrip("."))
         ]
     return [] if old == new else [f"{path}: {old!r} → {new!r}"]
-
-
-def _merged(base: Plain, overlay: Plain) -> Plain:
-    merged = dict(base)
-    for key, value in overlay.items():
-        nested = isinstance(value, dict) and isinstance(base.get(key), dict)
-        merged[key] = _merged(base[key], value) if nested else value
-    return merged

@@ -33,6 +33,8 @@ def structure(cls: type[T], plain: Any, where: str) -> T:
 
 
 def _value(hint: Any, value: Any, where: str) -> Any:
+    if hint is Any:
+        return value
     origin, args = get_origin(hint), get_args(hint)
     if origin is Annotated:
         return _value(args[0], value, where)
@@ -87,3 +89,22 @@ def to_plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [to_plain(item) for item in value]
     return value
+
+
+def merged(base: Plain, overlay: Plain) -> Plain:
+    """The overlay's fields over the base's, tables within tables likewise."""
+    result = dict(base)
+    for key, value in overlay.items():
+        both = isinstance(value, dict) and isinstance(base.get(key), dict)
+        result[key] = merged(base[key], value) if both else value
+    return result
+
+
+def nested(flat: Plain) -> Plain:
+    """{"cem.horizon": 3} → {"cem": {"horizon": 3}}."""
+    tables: Plain = {}
+    for path, value in flat.items():
+        for name in reversed(path.split(".")):
+            value = {name: value}
+        tables = merged(tables, value)
+    return tables

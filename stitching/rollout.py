@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -11,6 +12,7 @@ import torch
 
 from stitching.envs.protocol import Benchmark, EpisodeBlock
 from stitching.models.agent import Agent
+from stitching.planning.objective import spread_over_members
 from stitching.stitchers import Stitcher, policy_noise
 from stitching.streams import stream
 
@@ -21,6 +23,7 @@ class RolloutConfig:
 
     sample_actions: bool = False  # sample the policy; its mode otherwise, as in IQL's evaluation
     skill_limit: int = 0  # most steps of one skill, its stitch included; 0: only the task's own
+    stop_alpha: float = 0.0  # price of the values' disagreement when a stitch asks whether to go on
 
 
 @dataclass(frozen=True)
@@ -51,7 +54,9 @@ class Segments:
     success: np.ndarray  # (n,) bool
     stitch_steps: np.ndarray  # (n,) int64
     steps: np.ndarray  # (n,) int64, stitching included
-    value_start: np.ndarray  # (n,) float32, E[V] of this skill before the stitch
+    value_start: (
+        np.ndarray
+    )  # (n,) float32, this skill's before the stitch, as the stop rule sees it
     value_end: np.ndarray  # (n,) float32, and after it
     snapshots: np.ndarray  # (n, snapshot) float64, at the segment's end
 
@@ -116,11 +121,12 @@ def play_segment(
         budget = np.minimum(budget, config.skill_limit)
     progress = _Progress(block, skill, np.array(play.episodes), budget, recorder)
 
-    value_start = _value(agent, block, rows, skill)
+    value = partial(_value, agent, config.stop_alpha, block)
+    value_start = value(rows, skill)
     if len(play.prefix) > 1 and stitcher.limit:
-        _stitch(progress, agent, stitcher, play, names.index(play.prefix[-2]), value_start)
+        _stitch(progress, stitcher, play, names.index(play.prefix[-2]), value_start, value)
     stitch_steps = progress.steps.copy()
-    value_end = _value(agent, block, rows, skill)
+    value_end = value(rows, skill)
     _execute(progress, agent, benchmark, config, play)
     return Segments(
         success=progress.success,
@@ -134,16 +140,16 @@ def play_segment(
 
 def _stitch(
     progress: _Progress,
-    agent: Agent,
     stitcher: Stitcher,
     play: Play,
     previous: int,
-    value: np.ndarray,
+    value_start: np.ndarray,
+    value: Callable[[np.ndarray, int], np.ndarray],
 ) -> None:
     """Stitching phase: until the next skill's value no longer rises, or the limit."""
     streams = play.streams("planner", by_method=True)
-    value = value.copy()
-    rows = progress.open(np.arange(len(value)))
+    values = value_start.copy()
+    rows = progress.open(np.arange(len(values)))
     while len(rows):
         actions = stitcher.propose(
             torch.from_numpy(progress.block.observe(rows)),
@@ -161,9 +167,9 @@ def _stitch(
             if not len(moving):
                 break
         rows = moving
-        new_value = _value(agent, progress.block, rows, progress.skill)
-        rising = new_value > value[rows]
-        value[rows] = new_value
+        new_values = value(rows, progress.skill)
+        rising = new_values > values[rows]
+        values[rows] = new_values
         rows = rows[rising]
 
 
@@ -186,12 +192,14 @@ def _execute(
         rows = progress.open(rows)
 
 
-def _value(agent: Agent, block: EpisodeBlock, rows: np.ndarray, skill: int) -> np.ndarray:
-    """E[V] over the members, (n,) float32: what the stop rule watches on real states."""
+def _value(
+    agent: Agent, alpha: float, block: EpisodeBlock, rows: np.ndarray, skill: int
+) -> np.ndarray:
+    """E[V] − α·Var(V) of real states, (n,) float32: what the stop rule watches."""
     if not len(rows):
         return np.zeros(0, dtype=np.float32)
-    states = torch.from_numpy(block.observe(rows))
-    return agent.values(states, skill).mean(dim=0).numpy()
+    values = agent.values(torch.from_numpy(block.observe(rows)), skill)
+    return (values.mean(dim=0) - alpha * spread_over_members(values)).numpy()
 
 
 def play_from_start(

@@ -11,7 +11,6 @@ from stitching.envs.protocol import ActionSpace
 from stitching.planning.protocol import Plan, Score
 from stitching.planning.ranking import rankable
 
-
 SMALLEST = 1e-3  # share of the weights that not the best elite has, below which it is alone
 
 

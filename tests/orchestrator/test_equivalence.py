@@ -1,24 +1,18 @@
 """The same bytes, however the work is divided, ordered, shared or stripped of its tree."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from orchestrator import reproduce as reproducing
-from orchestrator.builders import load_models
 from orchestrator.executors.serial import SerialExecutor
 from orchestrator.jobs import Report
-from orchestrator.ledger import Outcome
-from orchestrator.methods import make_stitcher, method_name
-from orchestrator.plan import Node, Plan, make_plan
+from orchestrator.plan import make_plan
 from orchestrator.reproduce import Settings
 from orchestrator.spec import Spec
-from orchestrator.structure import to_plain
-from stitching.envs.registry import BENCHMARKS
-from stitching.rollout import Play, Segments, play_from_start
-from tests.orchestrator.tiny import Lines, Place, carry_out, promised_bytes, serially
+from tests.orchestrator.tiny import Alone, Lines, Place, carry_out, promised_bytes, serially
 
 METHODS = ("no-stitch", "random-stitch", "mf-stitch", "mb-stitch")
 
@@ -115,54 +109,6 @@ def test_ray(
     assert artifact_digests(place) == artifact_digests(serial)
 
 
-@dataclass(frozen=True)
-class Alone:
-    """A task of one seed and method, to be played from its start by a fixed group of episodes."""
-
-    plan: Plan
-    place: Place
-    seed: int
-    method: str
-    task: tuple[str, ...]
-    chunk: int
-
-    def play(self, step_limit: int) -> list[Segments]:
-        spec = self.plan.spec
-        benchmark = BENCHMARKS[spec.benchmark]
-        task = self.plan.tasks[Node(self.seed, self.method, self.task), self.chunk]
-        artifacts = {kind: self.place.store.read(kind, key) for kind, key in task.artifacts.items()}
-        models = load_models(benchmark, task.configs, artifacts)
-        settings = to_plain(spec.method_config(self.method))
-        return play_from_start(
-            benchmark.block(),
-            models["agent"],
-            make_stitcher(self.method, settings, benchmark, models["agent"], models),
-            benchmark,
-            spec.rollout,
-            Play(
-                spec.root_seed,
-                spec.benchmark,
-                self.seed,
-                method_name(self.method),
-                tuple(range(*self.plan.chunks[self.chunk])),
-                self.task,
-            ),
-            step_limit,
-        )
-
-    def recorded(self) -> list[Outcome]:
-        """What the tree has for the same, one outcome a skill while any episode survives."""
-        nodes = [
-            Node(self.seed, self.method if depth > 1 else "", self.task[:depth])
-            for depth in range(1, len(self.task) + 1)
-        ]
-        ledger = self.place.directory.ledger(read_only=True)
-        keys = [self.plan.tasks[node, self.chunk].key for node in nodes]
-        outcomes = [outcome for _, outcome in ledger.outcomes(keys)]
-        ledger.close()
-        return outcomes
-
-
 def sample(spec: Spec, place: Place, seed: int, method: str) -> list[Alone]:
     """Some tasks of each length, every chunk of their episodes."""
     plan = make_plan(spec)
@@ -175,24 +121,12 @@ def sample(spec: Spec, place: Place, seed: int, method: str) -> list[Alone]:
     ]
 
 
-COLUMNS = ("success", "stitch_steps", "steps", "value_start", "value_end")
-
-
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("method", METHODS)
 def test_tasks_played_without_the_tree(deep: Spec, serial: Place, method: str, seed: int) -> None:
     stitched = 0
     for alone in sample(deep, serial, seed, method):
-        recorded, played = alone.recorded(), alone.play(deep.step_limit)
-        assert len(played) == len(recorded)
-        for segments, outcome in zip(played, recorded, strict=True):
-            for name in COLUMNS:
-                ours, theirs = outcome.arrays[name], getattr(segments, name)
-                assert ours.dtype == theirs.dtype
-                assert ours.tobytes() == theirs.tobytes(), (alone.task, name)
-            reached = segments.snapshots[segments.success]
-            assert outcome.arrays["snapshots"].tobytes() == reached.tobytes()
-        stitched += len(played) > 1
+        stitched += alone.depth_of_the_same_bytes() > 1
     assert stitched
 
 

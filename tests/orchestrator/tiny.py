@@ -7,14 +7,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from unittest import mock
 
+from orchestrator.builders import load_models
 from orchestrator.executors.serial import SerialExecutor
 from orchestrator.jobs import BuildJob, Job
-from orchestrator.ledger import Ledger
+from orchestrator.ledger import Ledger, Outcome
+from orchestrator.methods import make_stitcher, method_name
+from orchestrator.plan import Node, Plan
 from orchestrator.progress import Silent
 from orchestrator.reproduce import Settings, reproduce
 from orchestrator.rundir import RunDirectory
 from orchestrator.spec import Spec, load_spec
 from orchestrator.store import Store
+from orchestrator.structure import to_plain
+from stitching.envs.registry import BENCHMARKS
+from stitching.rollout import Play, Segments, play_from_start
 
 TINY = Path(__file__).with_name("tiny.toml")
 
@@ -121,3 +127,64 @@ class Counted(SerialExecutor):
         else:
             self.played.update(task.key for task, _ in job.tasks)
         super().submit(job)
+
+
+@dataclass(frozen=True)
+class Alone:
+    """A task of one seed and method, to be played from its start by a fixed group of episodes."""
+
+    plan: Plan
+    place: Place
+    seed: int
+    method: str
+    task: tuple[str, ...]
+    chunk: int
+
+    def play(self, step_limit: int) -> list[Segments]:
+        spec = self.plan.spec
+        benchmark = BENCHMARKS[spec.benchmark]
+        task = self.plan.tasks[Node(self.seed, self.method, self.task), self.chunk]
+        artifacts = {kind: self.place.store.read(kind, key) for kind, key in task.artifacts.items()}
+        models = load_models(benchmark, task.configs, artifacts)
+        settings = to_plain(spec.method_config(self.method))
+        return play_from_start(
+            benchmark.block(),
+            models["agent"],
+            make_stitcher(self.method, settings, benchmark, models["agent"], models),
+            benchmark,
+            spec.rollout,
+            Play(
+                spec.root_seed,
+                spec.benchmark,
+                self.seed,
+                method_name(self.method),
+                tuple(range(*self.plan.chunks[self.chunk])),
+                self.task,
+            ),
+            step_limit,
+        )
+
+    def recorded(self) -> list[Outcome]:
+        """What the tree has for the same, one outcome a skill while any episode survives."""
+        nodes = [
+            Node(self.seed, self.method if depth > 1 else "", self.task[:depth])
+            for depth in range(1, len(self.task) + 1)
+        ]
+        ledger = self.place.directory.ledger(read_only=True)
+        keys = [self.plan.tasks[node, self.chunk].key for node in nodes]
+        outcomes = [outcome for _, outcome in ledger.outcomes(keys)]
+        ledger.close()
+        return outcomes
+
+    def depth_of_the_same_bytes(self) -> int:
+        """Skills played, each with the bytes that the tree has for it."""
+        recorded, played = self.recorded(), self.play(self.plan.spec.step_limit)
+        assert len(played) == len(recorded)
+        for segments, outcome in zip(played, recorded, strict=True):
+            for name in ("success", "stitch_steps", "steps", "value_start", "value_end"):
+                ours, theirs = outcome.arrays[name], getattr(segments, name)
+                assert ours.dtype == theirs.dtype
+                assert ours.tobytes() == theirs.tobytes(), (self.task, name)
+            reached = segments.snapshots[segments.success]
+            assert outcome.arrays["snapshots"].tobytes() == reached.tobytes()
+        return len(played)

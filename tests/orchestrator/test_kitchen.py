@@ -1,0 +1,89 @@
+"""A small Kitchen reproduction from data to report, with skills that really work."""
+
+import json
+from dataclasses import replace
+
+import pandas as pd
+import pytest
+
+from orchestrator.plan import Plan, make_plan
+from orchestrator.spec import Spec, load_spec
+from stitching.data.kitchen.segments import Order
+from stitching.models.dynamics import DynamicsConfig
+from stitching.models.iql import IQLConfig
+from stitching.planning.cem import CEM
+from tests.orchestrator.tiny import Alone, Place
+
+ORDER: Order = ("microwave", "kettle", "bottom burner", "slide cabinet")
+METHODS = ("no-stitch", "random-stitch", "mf-stitch", "mb-stitch")
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def spec() -> Spec:
+    """One order and what it is cut into, learned well enough to go four skills deep."""
+    spec = load_spec("table2", "smoke")
+    skills = IQLConfig(
+        updates=3000, learning_rate=1e-3, dropout=0.0, members=2, width=32,
+        policy_width=256, policy_layers=2, log_every=1000,
+    )  # fmt: skip
+    return replace(
+        spec,
+        lengths=(),
+        tasks=(">".join(ORDER[:3]), ">".join(ORDER), ">".join(ORDER[2:])),
+        episodes=4,
+        block_episodes=4,
+        data=replace(spec.data, episodes=12, held_out=1),
+        agent=skills,
+        dynamics=DynamicsConfig(updates=300, width=32, members=2, activation="elu"),
+        random_stitch=replace(spec.random_stitch, limit=3),
+        mf_stitch=replace(spec.mf_stitch, limit=3, training=replace(skills, updates=100)),
+        mb_stitch=replace(spec.mb_stitch, limit=3, cem=CEM(population=16, elites=4, iterations=10)),
+    )
+
+
+@pytest.fixture(scope="module")
+def played(spec: Spec, tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Place]:
+    with pytest.MonkeyPatch.context() as patch:
+        for module in ("orchestrator.kits", "stitching.data.kitchen.demonstrations"):
+            patch.setattr(f"{module}.orders", lambda config: (ORDER,))
+        place = Place(tmp_path_factory.mktemp("kitchen"))
+        place.carry_out(spec)
+        return make_plan(spec), place
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_long_tasks_played_without_the_tree(played: tuple[Plan, Place], method: str) -> None:
+    plan, place = played
+    depths = [
+        Alone(plan, place, 0, method, task, chunk=0).depth_of_the_same_bytes()
+        for task in plan.spec.all_tasks
+    ]
+    assert max(depths) >= 3
+
+
+def test_the_run_tells_of_pairs_and_models(played: tuple[Plan, Place]) -> None:
+    _, place = played
+    pairs = pd.read_csv(place.out / "report" / "pairs.csv")
+    shown = pairs[pairs["in_data"]]
+    known = set(zip(shown["first"], shown["second"], strict=True))
+    assert known <= set(zip(ORDER, ORDER[1:], strict=False))
+    diagnosis = json.loads((place.out / "diagnosis.json").read_text())
+    assert diagnosis["competence"].keys() == set(ORDER)
+    assert all(skill["rank_correlation"] > 0.8 for skill in diagnosis["values"].values())
+    assert diagnosis["predictions"]["5"]["groups"]["arm positions"]["relative"] < 1
+    for table in ("table2", "table8"):
+        assert (place.out / "report" / f"{table}.md").is_file()
+
+
+def test_a_shown_episode_is_recorded_step_by_step(played: tuple[Plan, Place]) -> None:
+    _, place = played
+    showcase = json.loads((place.out / "showcase.json").read_text())
+    for episode in showcase["episodes"]:
+        lengths = {len(episode[name]) for name in ("positions", "skill", "phase", "value")}
+        assert len(lengths) == 1
+        assert {len(at) for at in episode["positions"]} == {30}
+    stitched = showcase["episodes"][-1]
+    if stitched["accomplished"]:
+        assert "stitch" in stitched["phase"]
