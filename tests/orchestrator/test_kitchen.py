@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from itertools import pairwise
 
 import pandas as pd
 import pytest
@@ -68,7 +69,7 @@ def test_the_run_tells_of_pairs_and_models(played: tuple[Plan, Place]) -> None:
     pairs = pd.read_csv(place.out / "report" / "pairs.csv")
     shown = pairs[pairs["in_data"]]
     known = set(zip(shown["first"], shown["second"], strict=True))
-    assert known <= set(zip(ORDER, ORDER[1:], strict=False))
+    assert known <= set(pairwise(ORDER))
     diagnosis = json.loads((place.out / "diagnosis.json").read_text())
     assert diagnosis["competence"].keys() == set(ORDER)
     assert all(skill["rank_correlation"] > 0.8 for skill in diagnosis["values"].values())

@@ -696,6 +696,21 @@ def test_a_skill_has_its_own_limit_stitching_included(limit: int, success: bool)
     assert outcome.steps.tolist() == [6 if success else 5]
 
 
+@pytest.mark.parametrize(("alpha", "steps"), [(0.0, 3), (0.4, 3), (1.0, 1)])
+def test_the_stop_rule_watches_the_ensemble_value(alpha: float, steps: int) -> None:
+    """To the right the mean value rises by 1 a step, and the members' disagreement by 2."""
+    outcome, _ = on_the_floor(
+        walker(v_row=[0.0, 0.0], v_col=[3.0, -1.0]),
+        Signposts({row: [RIGHT] for row in range(1, 12)}, limit=3),
+        [(4, 2)],
+        config=RolloutConfig(stop_alpha=alpha),
+    )
+    assert outcome.stitch_steps.tolist() == [steps]
+    slope = 1 - 2 * alpha
+    np.testing.assert_allclose(outcome.value_start, [2 * slope], rtol=1e-5)
+    np.testing.assert_allclose(outcome.value_end, [(2 + steps) * slope], rtol=1e-5)
+
+
 def displacements(stitcher: Stitcher, method: str) -> list[list[tuple[int, int]]]:
     """The executed moves of each episode, by a policy of pure chance far from any wall."""
     cells = [(6, col) for col in (5, 6, 7)] * 2
