@@ -14,25 +14,23 @@ from orchestrator.recipes import Recipe
 from orchestrator.store import CorruptArtifactError, Store
 
 # Where this store has no history yet: measured on one core of a 2-core cloud machine.
-REFERENCE_SECONDS = {
-    "maze-demonstrations": 1.0,
-    "maze-exploration": 1.0,
-    "maze-showcase": 1.0,
-    "kitchen-demonstrations": 20.0,
-    "kitchen-human": 10.0,
-    "kitchen-held-out": 140.0,
-    "kitchen-showcase": 60.0,
-    "kitchen-diagnosis": 120.0,
-    "agent": 20.0,
-    "mf-policy": 10.0,
-    "dynamics": 15.0,
+SECONDS_PER_UPDATE = {
+    ("maze", "agent"): 0.005,
+    ("maze", "mf-policy"): 0.003,
+    ("maze", "dynamics"): 0.005,
+    ("kitchen", "agent"): 0.026,
+    ("kitchen", "mf-policy"): 0.016,
+    ("kitchen", "dynamics"): 0.011,
 }
+SECONDS_PER_DEMONSTRATION = {"kitchen-demonstrations": 0.5, "kitchen-held-out": 12.0}
+REFERENCE_SECONDS = {"kitchen-diagnosis": 120.0, "kitchen-showcase": 60.0}
+OTHER_SECONDS = 1.0  # of anything else, such as data of the maze
 # By benchmark, for methods that plan and for others: a segment's seconds.
 REFERENCE_SEGMENT = {("maze", True): 0.005, ("maze", False): 0.003} | {
     ("kitchen", True): 2.0,
     ("kitchen", False): 0.2,
 }
-REFERENCE_SUCCESS = 1.0  # so that the estimate is an upper bound
+REFERENCE_SUCCESS = {"maze": 0.9, "kitchen": 0.4}  # of a skill
 BYTES_PER_SEGMENT = {"maze": 120, "kitchen": 1300}
 
 Standing = Literal["found", "decided", "missing"]
@@ -60,7 +58,7 @@ def estimate(plan: Plan, store: Store, shared: Ledger) -> Estimate:
     """Look at store and ledger; runs nothing.
 
     How many episodes will survive to each block is what blocks like it have shown in this store;
-    where there were none, all are taken to survive.
+    where there were none, as many as usual in that benchmark.
     """
     spec = plan.spec
     artifacts: dict[str, Counter[bool]] = {}
@@ -70,7 +68,8 @@ def estimate(plan: Plan, store: Store, shared: Ledger) -> Estimate:
         found = (recipe.kind, key) in store
         artifacts.setdefault(recipe.kind, Counter())[found] += 1
         if not found:
-            training += trained.get(_size_class(recipe), REFERENCE_SECONDS[recipe.kind])
+            known = trained.get(_size_class(recipe))
+            training += _reference_seconds(recipe) if known is None else known
 
     history = shared.history()
     blocks: dict[str, Counter[Standing]] = {}
@@ -135,13 +134,24 @@ def standings(plan: Plan, shared: Ledger, history: Mapping[str, Played]) -> Iter
 
 
 def _success_rate(task: BlockTask, history: Mapping[str, Played]) -> float:
-    return history[task.kind].success_rate if task.kind in history else REFERENCE_SUCCESS
+    known = history.get(task.kind)
+    return REFERENCE_SUCCESS[task.benchmark] if known is None else known.success_rate
 
 
 def _seconds_each(task: BlockTask, history: Mapping[str, Played]) -> float:
     if task.kind in history:
         return history[task.kind].seconds_each
     return REFERENCE_SEGMENT[task.benchmark, task.method == "mb-stitch"]
+
+
+def _reference_seconds(recipe: Recipe) -> float:
+    config = recipe.params.get("config", {})
+    if (name := (recipe.params["benchmark"], recipe.kind)) in SECONDS_PER_UPDATE:
+        return SECONDS_PER_UPDATE[name] * float(config["updates"])
+    if recipe.kind in SECONDS_PER_DEMONSTRATION:
+        counted = "held_out" if recipe.kind == "kitchen-held-out" else "episodes"
+        return SECONDS_PER_DEMONSTRATION[recipe.kind] * float(config[counted])
+    return REFERENCE_SECONDS.get(recipe.kind, OTHER_SECONDS)
 
 
 def _steps_in_tree(plan: Plan) -> int:
@@ -169,5 +179,5 @@ def _training_history(store: Store) -> dict[tuple[str, str], float]:
 
 def _size_class(recipe: Recipe) -> tuple[str, str]:
     config = recipe.params.get("config", {})
-    size = [config.get(name) for name in ("updates", "width", "members", "episodes")]
+    size = [config.get(name) for name in ("updates", "width", "members", "episodes", "held_out")]
     return recipe.kind, str(size)
