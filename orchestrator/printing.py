@@ -42,7 +42,7 @@ def plan_lines(spec: Spec, costs: Estimate, workers: int | None) -> Iterator[str
     workers = workers or os.cpu_count() or 1
     source = "measured in this store" if costs.from_history else "from a reference machine"
     total = (costs.seconds_training + costs.seconds_evaluation) / workers
-    yield (f"to be played: about {costs.segments_missing:,} segments")
+    yield f"to be played: about {costs.segments_missing:,} segments"
     yield (
         f"time: {_duration(costs.seconds_training)} training and "
         f"{_duration(costs.seconds_evaluation)} evaluation on one core, together about "
