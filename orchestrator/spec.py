@@ -135,9 +135,18 @@ def check_spec(spec: Spec) -> None:
             raise UsageError(f"{where}, table {table.id}: the baseline is none of its methods")
 
 
+# Wherever in a spec they stand.
+AT_LEAST_ONE = {
+    "batch_size", "elites", "execute", "hidden_layers", "horizon", "iterations", "log_every",
+    "members", "population", "updates", "width",
+}  # fmt: skip
+
+
 def _check_numbers(plain: Any, where: str) -> None:
     if isinstance(plain, dict):
         for name, value in plain.items():
+            if name in AT_LEAST_ONE and value < 1:
+                raise UsageError(f"{where}, {name}: must be at least 1")
             _check_numbers(value, f"{where}, {name}")
     elif isinstance(plain, float) and not math.isfinite(plain):
         raise UsageError(f"{where}: {plain} is no finite number")
