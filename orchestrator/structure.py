@@ -27,9 +27,11 @@ def structure(cls: type[T], plain: Any, where: str) -> T:
     if missing:
         raise UsageError(f"{where}: field {missing[0]!r} is missing")
     hints = get_type_hints(cls)
-    return cls(
-        **{name: _value(hints[name], value, f"{where}, {name}") for name, value in plain.items()}
-    )
+    values = {name: _value(hints[name], value, f"{where}, {name}") for name, value in plain.items()}
+    try:
+        return cls(**values)
+    except ValueError as error:  # what a dataclass of settings says of values that do not fit
+        raise UsageError(f"{where}: {error}") from error
 
 
 def _value(hint: Any, value: Any, where: str) -> Any:

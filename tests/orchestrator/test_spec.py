@@ -73,7 +73,10 @@ def test_the_spec_below_is_sound(tmp_path: Path) -> None:
     [
         (SOUND + "[agent]\nlearning_rate = nan", "agent, learning_rate: nan is no finite number"),
         (SOUND + "[agent]\nupdates = 0", "agent, updates: must be at least 1"),
-        (SOUND + "[mb_stitch.cem]\npopulation = -5", "cem, population: must be at least 1"),
+        (
+            SOUND + "[mb_stitch.cem]\npopulation = 5\nelites = 9",
+            r"cem: elites must lie in 1..population \(5\): 9",
+        ),
         (SOUND + "[data]\nnoise = -inf", "data, noise: -inf is no finite number"),
         (SOUND.replace("no-stitch", "mb-stitch[beta=inf]"), "beta: inf is no finite number"),
         (SOUND.replace("2=50", "2=0"), "step_limits, 2: must be at least 1"),
