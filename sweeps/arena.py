@@ -1,0 +1,165 @@
+"""Where candidates are played: plans over one executor, one store and one ledger."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import pandas as pd
+
+from analysis.episodes import episodes_from_segments
+from analysis.run import RunSpec
+from orchestrator.building import Builds, verified_artifacts
+from orchestrator.errors import IncompleteError
+from orchestrator.evaluation import Evaluation
+from orchestrator.executors.protocol import Executor
+from orchestrator.exports import quarantine, segments_frame
+from orchestrator.jobs import BuildJob, Job, PlayJob, Report
+from orchestrator.ledger import Ledger, Outcome
+from orchestrator.plan import Plan, make_plan
+from orchestrator.progress import Progress, Silent
+from orchestrator.rundir import describe
+from orchestrator.spec import Spec
+from orchestrator.store import Artifact, Store
+
+
+@dataclass(frozen=True)
+class Played:
+    """What a spec's episodes did: rows a segment and rows an episode (see `analysis`)."""
+
+    segments: pd.DataFrame
+    episodes: pd.DataFrame
+
+
+@dataclass
+class Tally:
+    """An executor that counts what it was asked to do, and is handed each artifact but once."""
+
+    inner: Executor
+    built: Counter[str] = field(default_factory=Counter)  # kind → artifacts
+    blocks: Counter[str] = field(default_factory=Counter)  # kind of segment → blocks played
+    steps: Counter[str] = field(default_factory=Counter)  # kind of segment → environment steps
+    seconds: defaultdict[str, float] = field(  # kind of segment → worker seconds
+        default_factory=lambda: defaultdict(float)
+    )
+    _provided: set[str] = field(default_factory=set)
+
+    def counts(self) -> dict[str, dict[str, float]]:
+        """Everything counted, by what is counted and its kind."""
+        return {
+            "artifacts trained": dict(self.built),
+            "blocks played": dict(self.blocks),
+            "environment steps": dict(self.steps),
+            "worker seconds": {kind: round(spent, 1) for kind, spent in self.seconds.items()},
+        }
+
+    @property
+    def workers(self) -> int:
+        return self.inner.workers
+
+    def provide(self, key: str, artifact: Artifact) -> None:
+        if key not in self._provided:
+            self.inner.provide(key, artifact)
+            self._provided.add(key)
+
+    def submit(self, job: Job) -> None:
+        self.inner.submit(job)
+
+    def next(self) -> Report:
+        report = self.inner.next()
+        if isinstance(report.job, BuildJob):
+            self.built[report.job.recipe.kind] += report.artifact is not None
+        elif isinstance(report.job, PlayJob):
+            kinds = {task.key: task.method or "first skills" for task, _ in report.job.tasks}
+            for block in report.blocks:
+                if block.outcome is not None:
+                    kind = kinds[block.key]
+                    steps = Outcome.from_bytes(block.outcome).arrays["steps"]
+                    self.blocks[kind] += 1
+                    self.steps[kind] += int(steps.sum())
+                    self.seconds[kind] += block.seconds
+        return report
+
+    def close(self) -> None:
+        self.inner.close()
+
+
+class Quiet(Silent):
+    """Passes on what is said, and draws nothing: the sweep's own bar counts trials."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress = progress
+
+    def say(self, message: str) -> None:
+        self._progress.say(message)
+
+
+class Arena:
+    """Plays specs, finding whatever any run over the same store has finished."""
+
+    def __init__(self, store: Path, ledger: Ledger, executor: Executor, progress: Progress) -> None:
+        self.store = Store(store)
+        self.ledger = ledger
+        self.shared = Ledger(store / "blocks.sqlite")
+        self.tally = Tally(executor)
+        self.progress = progress
+        self._whole: set[str] = set()  # artifacts that are there, each checked but once
+
+    @contextmanager
+    def quietly(self) -> Iterator[None]:
+        """Inside, only what is said gets through: somebody else draws how far the work is."""
+        loud, self.progress = self.progress, Quiet(self.progress)
+        try:
+            yield
+        finally:
+            self.progress = loud
+
+    def prepare(self, spec: Spec) -> None:
+        """Train what a spec needs and the store does not have."""
+        self._build(make_plan(spec))
+
+    def play(self, spec: Spec, seeds: Iterable[int] | None = None) -> Played:
+        """Train and simulate what is missing; all seeds of the spec, or some.
+
+        Raises IncompleteError when blocks had to be given up: a result on what is left would be
+        another one. The same command tries again.
+        """
+        plan = make_plan(spec)
+        wanted = tuple(range(spec.seeds) if seeds is None else seeds)
+        plan = only_seeds(plan, wanted)
+        self._build(plan)
+        Evaluation(plan, self.store, self.ledger, self.shared, self.tally, self.progress).run()
+        if given_up := quarantine(plan, self.ledger):
+            raise IncompleteError(
+                f"{len(given_up)} blocks were given up after repeated failures, last with: "
+                f"{given_up[-1]['error'].strip()}\nThe same command tries again"
+            )
+        segments = segments_frame(plan, self.ledger)
+        run = replace(RunSpec.from_dict(describe(spec)), seeds=wanted)
+        return Played(segments, episodes_from_segments(segments, run))
+
+    def _build(self, plan: Plan) -> None:
+        unseen = {k: r for k, r in plan.recipes.items() if k in plan.needed - self._whole}
+        unseen_plan = replace(plan, recipes=unseen)
+        self._whole |= verified_artifacts(unseen_plan, self.store, self.ledger, self.progress)
+        if plan.needed - self._whole:
+            builds = Builds(plan, self.store, self.ledger, self.tally, self.progress)
+            builds.run(plan.needed, self._whole & set(plan.recipes))
+            self._whole |= plan.needed
+
+    def close(self) -> None:
+        self.tally.close()
+        self.shared.close()
+
+
+def only_seeds(plan: Plan, seeds: tuple[int, ...]) -> Plan:
+    """The part of a plan that some seeds take."""
+    return replace(
+        plan,
+        agents={seed: plan.agents[seed] for seed in seeds},
+        dynamics={seed: key for seed, key in plan.dynamics.items() if seed in seeds},
+        nodes=tuple(node for node in plan.nodes if node.seed in seeds),
+    )

@@ -1,0 +1,76 @@
+"""Honest winners: the best trials again, on tasks and seeds that the search has never seen."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from orchestrator.spec import Spec
+from orchestrator.structure import Plain
+from sweeps.arena import Arena
+from sweeps.scoring import play_candidates
+from sweeps.space import describe
+from sweeps.spec import SweepSpec, base_spec, split_tasks
+from sweeps.study import RESULT, SweepStudy
+
+
+def confirm_spec(sweep: SweepSpec) -> tuple[Spec, tuple[int, ...]]:
+    """What the best trials are played on again, and by which seeds.
+
+    Without held-out tasks only the seeds are new. A new seed retrains everything; another root
+    seed makes other data, too.
+    """
+    base, wanted = base_spec(sweep), sweep.confirm
+    searched, held_out = split_tasks(sweep, base)
+    root_seed = base.root_seed if wanted.root_seed is None else wanted.root_seed
+    first = base.seeds if root_seed == base.root_seed else 0
+    seeds = wanted.seeds or tuple(range(first, first + base.seeds))
+    spec = replace(
+        base,
+        lengths=(),
+        tasks=tuple(map(">".join, held_out or searched)),
+        root_seed=root_seed,
+        seeds=max(seeds) + 1,
+        episodes=wanted.episodes or base.episodes,
+    )
+    return spec, seeds
+
+
+def confirm(sweep: SweepSpec, study: SweepStudy, arena: Arena) -> Plain:
+    """The best trials beside No-Stitch and the base's own setting, each gain with its interval.
+
+    The winner is the search's best. The others are there to compare it with: a winner chosen by
+    these episodes could not be judged by them.
+    """
+    best = study.ranked()[: sweep.confirm.best]
+    if not best:
+        return {}
+    spec, seeds = confirm_spec(sweep)
+    candidates = [study.fields(trial) for trial in best]
+    *showings, base = play_candidates(arena, spec, [*candidates, {}], seeds)
+    rows = []
+    for trial, showing in zip(best, showings, strict=True):
+        names = (sweep.name, "confirm", str(trial.number))
+        over_base = showing.gain_over(base.episodes, *names, "over the base")
+        found, again = trial.user_attrs[RESULT], showing.result(*names)
+        rows.append(
+            {
+                "trial": trial.number,
+                "fields": study.fields(trial),
+                "setting": describe(study.fields(trial)),
+                "search_gain": found["gain"],
+                "survives": again["gain"] / found["gain"] if found["gain"] > 0 else None,
+                "over_base": over_base.difference,
+                "over_base_low": over_base.low,
+                "over_base_high": over_base.high,
+            }
+            | again
+        )
+    return {
+        "tasks": list(spec.tasks),
+        "held_out": bool(split_tasks(sweep, base_spec(sweep))[1]),
+        "seeds": list(seeds),
+        "root_seed": spec.root_seed,
+        "episodes": spec.episodes,
+        "base": base.result(sweep.name, "confirm", "base"),
+        "trials": rows,
+    }

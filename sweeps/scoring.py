@@ -1,0 +1,112 @@
+"""What a candidate's episodes come to: its gain over No-Stitch, its score, and its planning."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from analysis.statistics import Gain, generator, paired_differences, paired_gain
+from orchestrator.methods import MBStitchConfig
+from orchestrator.spec import Spec
+from orchestrator.structure import Plain
+from sweeps.arena import Arena, Played
+from sweeps.candidates import NO_STITCH, group
+from sweeps.space import Fields
+
+
+@dataclass(frozen=True)
+class Showing:
+    """How one candidate did beside No-Stitch under the base's models."""
+
+    method: str
+    config: MBStitchConfig
+    segments: pd.DataFrame  # its own, first skills left out
+    episodes: pd.DataFrame
+    baseline: pd.DataFrame  # No-Stitch's episodes
+
+    def gain_over(self, other: pd.DataFrame, *names: str) -> Gain:
+        """Paired by seed, task and episode; the interval's draws belong to these names."""
+        return paired_gain(self.episodes, other, generator("sweep", *names))
+
+    def result(self, *names: str) -> Plain:
+        """The metrics of a trial (see `sweeps.spec.MAXIMISED`)."""
+        gain = self.gain_over(self.baseline, *names)
+        return {
+            "gain": gain.difference,
+            "gain_low": gain.low,
+            "gain_high": gain.high,
+            "score": gain.score_first,
+            "no_stitch": gain.score_second,
+            "imagined": self.imagined,
+            "pairs": gain.pairs,
+            "tasks": self.by_task(),
+        }
+
+    def by_task(self) -> dict[str, float]:
+        """Task → its paired gain over No-Stitch."""
+        pairs = paired_differences(self.episodes, self.baseline)
+        means = pairs.groupby(["task", "seed"])["difference"].mean().groupby("task").mean()
+        return {str(task): float(gain) for task, gain in means.items()}
+
+    @property
+    def imagined(self) -> float:
+        """Model steps that planning one stitch takes, at most.
+
+        plans · population · horizon · iterations, with one plan for every `execute` steps of the
+        stitch. It is an upper bound where CEM converges early, but, unlike seconds, the same on
+        any machine and for any number of workers.
+        """
+        if self.segments.empty:
+            return 0.0
+        config = self.config
+        plans = np.ceil(self.segments["stitch_steps"].to_numpy() / config.execute).mean()
+        if config.planner == "cem":
+            steps = config.cem.population * config.cem.iterations
+        else:
+            steps = config.random_shooting.population
+        return float(plans * steps * config.horizon)
+
+    def instances(self, places: dict[tuple[str, int], int]) -> dict[int, float]:
+        """Place of a (task, episode) → its paired gain over No-Stitch, mean over seeds.
+
+        Episodes whose first skill failed are left out: no method could have differed there.
+        """
+        key = ["seed", "task", "episode"]
+        pairs = self.episodes.merge(self.baseline, on=key, suffixes=("", "_baseline"))
+        pairs = pairs[(pairs["accomplished"] > 0) | (pairs["accomplished_baseline"] > 0)].copy()
+        pairs["gain"] = (pairs["accomplished"] - pairs["accomplished_baseline"]) / pairs["length"]
+        means = pairs[["task", "episode", "gain"]].groupby(["task", "episode"]).mean().reset_index()
+        return {
+            places[row["task"], int(row["episode"])]: float(row["gain"])
+            for row in means.to_dict("records")
+        }
+
+
+def play_candidates(
+    arena: Arena, base: Spec, candidates: Sequence[Fields], seeds: Sequence[int] | None = None
+) -> list[Showing]:
+    """All candidates on the base's tasks and episodes; what they share is played once."""
+    showings: dict[int, Showing] = {}
+    baseline = pd.DataFrame()
+    for one in group(candidates, base, f"sweep over {base.name}"):
+        played = arena.play(one.spec, seeds)
+        if NO_STITCH in one.spec.methods:
+            baseline = _of(played.episodes, NO_STITCH)
+        for place, method in one.methods.items():
+            showings[place] = _showing(played, one.spec, method, baseline)
+    return [showings[place] for place in range(len(candidates))]
+
+
+def _showing(played: Played, spec: Spec, method: str, baseline: pd.DataFrame) -> Showing:
+    config = spec.method_config(method)
+    assert isinstance(config, MBStitchConfig)
+    return Showing(
+        method, config, _of(played.segments, method), _of(played.episodes, method), baseline
+    )
+
+
+def _of(rows: pd.DataFrame, method: str) -> pd.DataFrame:
+    return rows[rows["method"] == method]

@@ -1,0 +1,130 @@
+"""The search itself: batches of trials, played in rounds, some given up between two rounds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from copy import copy
+from dataclasses import replace
+from math import ceil
+
+from optuna.trial import FrozenTrial
+
+from orchestrator.progress import Progress
+from orchestrator.spec import Spec
+from stitching.streams import stream
+from sweeps.arena import Arena
+from sweeps.scoring import Showing, play_candidates
+from sweeps.space import describe
+from sweeps.spec import SweepSpec, base_spec, split_tasks
+from sweeps.study import RESULT, SweepStudy, wilcoxon
+
+
+def search_spec(sweep: SweepSpec) -> Spec:
+    """The base on the search's tasks alone, in the order that rounds follow.
+
+    Families of tasks, which begin with the same two skills, are shuffled and stay together: a
+    round then costs its share of the tree, and no more.
+    """
+    base = base_spec(sweep)
+    searched, _ = split_tasks(sweep, base)
+    if sweep.pruner.rounds > 1:
+        families = list(dict.fromkeys(task[:2] for task in searched))
+        order = stream("order of tasks", sweep.seed).permutation(len(families))
+        searched = [t for place in order for t in searched if t[:2] == families[place]]
+    return replace(base, lengths=(), tasks=tuple(map(">".join, searched)))
+
+
+def rounds(spec: Spec, count: int) -> list[Spec]:
+    """Ever larger parts of a spec, the last one all of it: more episodes, or else more tasks.
+
+    Episodes are added by whole blocks, so that every part is found again in the next. With enough
+    of them every round has all tasks, and what is told of a trial given up is not the luck of
+    easy ones.
+    """
+    blocks = ceil(spec.episodes / spec.block_episodes)
+    if blocks >= min(count, len(spec.tasks)):
+        shares = [ceil(blocks * part / count) for part in range(1, count + 1)]
+        return [
+            replace(spec, episodes=min(spec.episodes, share * spec.block_episodes))
+            for share in dict.fromkeys(shares)
+        ]
+    sizes = [ceil(len(spec.tasks) * part / count) for part in range(1, count + 1)]
+    return [replace(spec, tasks=spec.tasks[:size]) for size in dict.fromkeys(sizes)]
+
+
+def run_search(
+    sweep: SweepSpec, study: SweepStudy, arena: Arena, progress: Progress
+) -> Iterator[None]:
+    """Play and tell every trial that is missing; yields after each batch."""
+    spec = search_spec(sweep)
+    progress.phase("trials", sweep.budget, len(study.finished))
+    while batch := study.next_batch():
+        # With some of a batch told, the others' results are there: they were kept before.
+        unplayed = [trial for trial in batch if RESULT not in trial.user_attrs]
+        _play_batch(sweep, spec, study, unplayed, arena)
+        study.tell(batch)
+        for trial in batch:
+            progress.advance()
+            progress.say(trial_line(study, study.trials[trial.number]))
+        yield
+
+
+def _play_batch(
+    sweep: SweepSpec, spec: Spec, study: SweepStudy, batch: list[FrozenTrial], arena: Arena
+) -> None:
+    """Play trials and keep their results, those of given-up ones on what they played."""
+    places = {
+        (task, episode): place * spec.episodes + episode
+        for place, task in enumerate(spec.tasks)
+        for episode in range(spec.episodes)
+    }
+    parts = rounds(spec, sweep.pruner.rounds)
+    going_on = list(batch)
+    shown: dict[int, tuple[Showing, int]] = {}  # number → what it did, in how many rounds
+    for done, part in enumerate(parts, start=1):
+        showings = play_candidates(arena, part, [study.fields(trial) for trial in going_on])
+        shown |= {t.number: (s, done) for t, s in zip(going_on, showings, strict=True)}
+        if len(parts) == 1:
+            break
+        instances = [showing.instances(places) for showing in showings]
+        for trial, gains in zip(going_on, instances, strict=True):
+            _report(study, trial, gains)
+        if done < len(parts):
+            judged = zip(going_on, instances, strict=True)
+            going_on = [trial for trial, gains in judged if not _hopeless(study, trial, gains)]
+    for trial in batch:
+        showing, done = shown[trial.number]
+        played = {"pruned": done < len(parts), "rounds": done, "method": showing.method}
+        study.keep(trial, showing.result(sweep.name, str(trial.number)) | played)
+
+
+def _report(study: SweepStudy, trial: FrozenTrial, instances: dict[int, float]) -> None:
+    """Write down the instances that the study does not have yet."""
+    known = study.trials[trial.number].intermediate_values
+    handle = study.handle(trial)
+    for place in sorted(instances.keys() - known.keys()):
+        handle.report(instances[place], place)
+
+
+def _hopeless(study: SweepStudy, trial: FrozenTrial, instances: dict[int, float]) -> bool:
+    """Whether a trial is told from the best of earlier batches on the instances both have.
+
+    Environments draw the same random numbers in all trials, which the pairing cancels. The
+    instances are those of this round, though a killed process may have left later ones behind.
+    """
+    seen = copy(trial)
+    seen.intermediate_values = instances
+    return wilcoxon(study.sweep).prune(study.study, seen)
+
+
+def trial_line(study: SweepStudy, trial: FrozenTrial) -> str:
+    """ "trial 7: gain +0.213 [+0.150, +0.270], alpha 3.1, beta 0.5" """
+    result = trial.user_attrs[RESULT]
+    best: Sequence[FrozenTrial] = study.ranked()[:1]
+    note = " · best so far" if best and best[0].number == trial.number else ""
+    note = f" · given up after round {result['rounds']}" if result["pruned"] else note
+    return (
+        f"trial {trial.number}: gain {result['gain']:+.3f} "
+        f"[{result['gain_low']:+.3f}, {result['gain_high']:+.3f}], "
+        f"{describe(study.fields(trial))}{note}"
+    )

@@ -1,0 +1,202 @@
+"""What is to be searched, as a frozen dataclass read from a TOML file."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass, field, replace
+from importlib import resources
+from pathlib import Path
+from typing import Literal
+
+from orchestrator.errors import UsageError
+from orchestrator.spec import Scale, Spec, TableSpec, load_spec, spec_from_plain
+from orchestrator.structure import Plain, merged, structure, to_plain
+from stitching.streams import stream
+from sweeps.space import Space, check_space, grid_points
+
+Metric = Literal["gain", "score", "imagined"]
+MAXIMISED: dict[Metric, bool] = {
+    "gain": True,  # mean score over No-Stitch's, paired by seed, task and episode
+    "score": True,  # accomplished share of a task's skills
+    "imagined": False,  # model steps that planning one stitch takes, at most
+}
+
+
+@dataclass(frozen=True)
+class Pruner:
+    """Gives up trials that Wilcoxon's signed-rank test tells from the best one so far."""
+
+    rounds: int = 1  # parts in which a trial is played, the test after each; 1: never pruned
+    p: float = 0.1  # given up below this p-value
+    startup: int = 12  # instances (task, episode) before the first test
+
+
+@dataclass(frozen=True)
+class Confirm:
+    """How the best trials are judged again, where the search has never been."""
+
+    best: int = 3  # trials; 0: none
+    seeds: tuple[int, ...] = ()  # default: as many as the search had, after them
+    root_seed: int | None = None  # another one makes other data, too; default: the base's
+    episodes: int | None = None  # default: the base's
+
+
+@dataclass(frozen=True)
+class SweepSpec:
+    """A search over fields of a run spec."""
+
+    name: str
+    title: str
+    base: str  # name or file of a run spec, taken at the sweep's own scale
+    space: Space
+    scale: Scale = "paper"
+    settings: Plain = field(default_factory=dict)  # fields of the base, changed for all trials
+    tasks: tuple[str, ...] = ()  # the search's; default: the base's, less the held-out
+    searched: int = 0  # so many of these tasks, drawn by the sweep's seed; 0: all
+    held_out: tuple[str, ...] = ()  # tasks that only confirmation sees
+    held_out_share: float = 0.0  # or this share of the base's tasks, drawn by the sweep's seed
+    sampler: Literal["tpe", "random", "grid"] = "tpe"
+    trials: int = 40  # the grid: all its points
+    batch: int = 4  # trials asked at once; part of what makes the study
+    startup: int = 10  # random trials before TPE begins
+    base_first: bool = True  # the base's own setting is the first trial
+    seed: int = 0  # of the sampler
+    objectives: tuple[Metric, ...] = ("gain",)
+    constraints: dict[str, float] = field(default_factory=dict)  # metric → most it may be
+    pruner: Pruner = Pruner()
+    confirm: Confirm = Confirm()
+    tables: tuple[TableSpec, ...] = ()  # of a grid: its points beside No-Stitch
+
+    def __post_init__(self) -> None:
+        check_sweep(self)
+
+    @property
+    def points(self) -> list[dict[str, int | float | bool | str]]:
+        """The grid's, in order; none for other samplers."""
+        where = f"sweep {self.name}, space"
+        return grid_points(self.space, where) if self.sampler == "grid" else []
+
+    @property
+    def budget(self) -> int:
+        """Trials in all."""
+        return len(self.points) if self.sampler == "grid" else self.trials
+
+
+def check_sweep(sweep: SweepSpec) -> None:
+    """Refuse what could not be carried out; UsageError says what is valid."""
+    where = f"sweep {sweep.name}"
+    for name in ("trials", "batch"):
+        if getattr(sweep, name) < 1:
+            raise UsageError(f"{where}, {name}: must be at least 1")
+    if not sweep.objectives or len(set(sweep.objectives)) < len(sweep.objectives):
+        raise UsageError(f"{where}, objectives: name one or more, each once")
+    if unknown := [name for name in sweep.constraints if name not in MAXIMISED]:
+        raise UsageError(
+            f"{where}, constraints: unknown metric {unknown[0]!r}; there are {', '.join(MAXIMISED)}"
+        )
+    if sweep.pruner.rounds < 1 or not 0 < sweep.pruner.p < 1:
+        raise UsageError(f"{where}, pruner: rounds must be at least 1, and 0 < p < 1")
+    if sweep.pruner.rounds > 1 and sweep.objectives[0] == "imagined":
+        raise UsageError(f"{where}, pruner: compares scores: make gain or score the objective")
+    if sweep.pruner.rounds > 1 and len(sweep.objectives) > 1:
+        raise UsageError(f"{where}, pruner: works with one objective; set rounds = 1")
+    if not 0 <= sweep.held_out_share < 1:
+        raise UsageError(f"{where}, held_out_share: must lie in [0, 1)")
+    if sweep.held_out and sweep.held_out_share:
+        raise UsageError(f"{where}: give held_out or held_out_share, not both")
+    if sweep.tables and sweep.sampler != "grid":
+        raise UsageError(f"{where}, tables: only a grid's points make a table")
+    if sweep.tables and any(not path.startswith("mb_stitch.") for path in sweep.space):
+        raise UsageError(f"{where}, tables: a table compares methods, not models: search mb_stitch")
+    base = base_spec(sweep)
+    check_space(sweep.space, base, f"{where}, space")
+    if sweep.budget < 1:
+        raise UsageError(f"{where}, space: a grid without points")
+    searched, held_out = split_tasks(sweep, base)
+    if not searched:
+        raise UsageError(f"{where}: no tasks are left to search on")
+    seen = {task[:2] for task in searched}
+    if leaks := [task for task in held_out if task[:2] in seen]:
+        raise UsageError(
+            f"{where}, held_out: {'>'.join(leaks[0])} begins like a task of the search, so that it "
+            "would not be new; hold out tasks whose first two skills the search never joins"
+        )
+    replace(base, tasks=tuple(map(">".join, [*searched, *held_out])), lengths=())
+    fresh = sweep.confirm.root_seed not in (None, base.root_seed)
+    if used := [seed for seed in sweep.confirm.seeds if seed < base.seeds and not fresh]:
+        raise UsageError(
+            f"{where}, confirm.seeds: the search itself uses seed {used[0]}; begin with "
+            f"{base.seeds}, or set another confirm.root_seed"
+        )
+
+
+def base_spec(sweep: SweepSpec) -> Spec:
+    """The run spec that trials change, with the sweep's settings."""
+    loaded = load_spec(sweep.base, sweep.scale)
+    where = f"sweep {sweep.name}, settings"
+    plain = merged(to_plain(loaded), sweep.settings) | {"methods": ["no-stitch", "mb-stitch"]}
+    return spec_from_plain(plain | {"tables": []}, where)
+
+
+Task = tuple[str, ...]
+
+
+def split_tasks(sweep: SweepSpec, base: Spec) -> tuple[list[Task], list[Task]]:
+    """The search's tasks and the held-out ones.
+
+    A share is drawn by families: tasks with the same first two skills begin with the same
+    segments, and so stay together.
+    """
+    held_out = [tuple(task.split(">")) for task in sweep.held_out]
+    tasks = [tuple(task.split(">")) for task in sweep.tasks] or base.all_tasks
+    if sweep.held_out_share:
+        families = list(dict.fromkeys(task[:2] for task in tasks))
+        drawn = stream("held-out tasks", sweep.seed).permutation(len(families))
+        count = max(1, round(sweep.held_out_share * len(families)))
+        chosen = {families[place] for place in drawn[:count]}
+        held_out = [task for task in tasks if task[:2] in chosen]
+    searched = [task for task in tasks if task not in set(held_out)]
+    if 0 < sweep.searched < len(searched):
+        drawn = stream("searched tasks", sweep.seed).permutation(len(searched))
+        searched = [searched[place] for place in sorted(drawn[: sweep.searched])]
+    return searched, held_out
+
+
+def packaged_sweeps() -> list[str]:
+    return sorted(
+        entry.name.removesuffix(".toml")
+        for entry in resources.files("sweeps").joinpath("specs").iterdir()
+        if entry.name.endswith(".toml")
+    )
+
+
+def load_sweep(name_or_file: str, scale: Scale = "paper", trials: int | None = None) -> SweepSpec:
+    """A packaged sweep by name, or any TOML file, at one of its scales.
+
+    A base that is a file is looked for beside the sweep's own. Raises UsageError listing what is
+    valid.
+    """
+    if name_or_file in packaged_sweeps():
+        source = resources.files("sweeps").joinpath("specs", f"{name_or_file}.toml")
+        data, where, folder = source.read_bytes(), f"packaged sweep {name_or_file}", None
+    elif Path(name_or_file).is_file():
+        data, where = Path(name_or_file).read_bytes(), name_or_file
+        folder = Path(name_or_file).parent
+    else:
+        raise UsageError(
+            f"no sweep {name_or_file!r}: neither a file nor one of {', '.join(packaged_sweeps())}"
+        )
+    try:
+        content = tomllib.loads(data.decode())
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise UsageError(f"{where}: not valid TOML: {error}") from error
+    scales = {"paper": {}} | content.pop("scales", {})
+    if scale not in scales:
+        raise UsageError(f"{where}: no scale {scale!r}; it has {', '.join(scales)}")
+    content = merged(content, scales[scale]) | {"scale": scale}
+    if trials is not None:
+        content["trials"] = trials
+    base = content.get("base")
+    if folder is not None and isinstance(base, str) and (folder / base).is_file():
+        content["base"] = str((folder / base).resolve())
+    return structure(SweepSpec, content, where)

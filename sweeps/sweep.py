@@ -1,0 +1,143 @@
+"""One sweep from beginning to end: search, confirm, write up, track."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from orchestrator.errors import ChangedError, UsageError
+from orchestrator.progress import Progress
+from orchestrator.provenance import provenance
+from orchestrator.reproduce import LazyExecutor, Settings
+from orchestrator.rundir import RunDirectory
+from orchestrator.store import storage_errors
+from orchestrator.structure import Plain, to_plain
+from sweeps.arena import Arena, Tally
+from sweeps.confirm import confirm
+from sweeps.report import write_report
+from sweeps.search import run_search, search_spec
+from sweeps.space import describe
+from sweeps.spec import SweepSpec
+from sweeps.study import RESULT, SweepStudy, feasible
+from sweeps.table import write_table
+from sweeps.tracking import Tracker
+
+MAY_CHANGE = ("trials", "confirm", "title", "tables")  # under a study that goes on
+
+
+def default_out(sweep: SweepSpec) -> Path:
+    return Path("runs") / f"sweep-{sweep.name}-{sweep.scale}"
+
+
+def carry_out(
+    sweep: SweepSpec, settings: Settings, progress: Progress, results: Path | None = None
+) -> RunDirectory:
+    """Search, or go on where an earlier command ended; returns the sweep's directory.
+
+    study.journal     the Optuna study, for optuna-dashboard too
+    sweep.json        what was asked
+    trials.json       every finished trial with its result
+    confirm.json      the best ones on held-out tasks and new seeds
+    winner.json       for `skillstitch run … --from-sweep`
+    counts.json       what was trained and simulated for it; all else was found
+    table/            of a grid: all its points as one run, with the usual tables
+    report/           index.md, trials.csv, confirm.csv, figures
+
+    Raises what a reproduction raises; IncompleteError loses nothing.
+    """
+    directory = RunDirectory(settings.out)
+    with directory.locked():
+        run_id = directory.settle(search_spec(sweep))
+        settle(directory, sweep)
+        study = SweepStudy(sweep, directory.path)
+        if study.cut:
+            progress.say(f"{study.path}: cut {study.cut} bytes of a line torn by a kill")
+        ledger = directory.ledger()
+        earlier = directory.read_json("counts.json") or {}
+        arena = Arena(settings.store, ledger, LazyExecutor(settings), progress)
+        tracker = Tracker(settings.resolved_tracking_uri(), directory, run_id, progress)
+        finished = False
+        try:
+            with storage_errors(directory.path):
+                arena.prepare(search_spec(sweep))
+                with arena.quietly():
+                    for _ in run_search(sweep, study, arena, progress):
+                        _write_results(directory, study, arena.tally, earlier)
+                        tracker.publish("RUNNING", patient=True)
+                _write_results(directory, study, arena.tally, earlier)
+                directory.write_json("confirm.json", confirm(sweep, study, arena))
+                directory.write_json("winner.json", winner(directory, study))
+                directory.write_json("provenance.json", provenance() | {"run_id": run_id})
+                if sweep.tables:
+                    with arena.quietly():
+                        write_table(sweep, arena, directory.path / "table")
+                write_report(sweep, study, directory, results)
+            finished = True
+        finally:
+            _write_counts(directory, arena.tally, earlier)
+            arena.close()
+            ledger.close()
+            tracker.publish("FINISHED" if finished else "FAILED")
+    return directory
+
+
+def settle(directory: RunDirectory, sweep: SweepSpec) -> None:
+    """Claim the directory for a sweep, or check that its study is of the same one."""
+    asked = json.loads(json.dumps(to_plain(sweep)))
+    before = directory.read_json("sweep.json") or asked
+    changed = [
+        f"{name}: {before.get(name)!r} → {value!r}"
+        for name, value in asked.items()
+        if name not in MAY_CHANGE and before.get(name) != value
+    ]
+    if changed:
+        raise ChangedError(
+            f"{directory.path} holds another study; choose another --out (finished blocks are "
+            "shared), or go back to:\n  " + "\n  ".join(changed)
+        )
+    directory.write_json("sweep.json", asked)
+
+
+def winner(directory: RunDirectory, study: SweepStudy) -> Plain:
+    """The search's best trial, and what confirmation says of it."""
+    best = study.ranked()[:1]
+    if not best:
+        raise UsageError(
+            f"{directory.path}: no trial keeps to the constraints; loosen them under another --out"
+        )
+    confirmed = (directory.read_json("confirm.json") or {}).get("trials", [{}])[0]
+    return {
+        "sweep": study.sweep.name,
+        "base": study.sweep.base,
+        "benchmark": directory.spec().benchmark,
+        "trial": best[0].number,
+        "fields": study.fields(best[0]),
+        "search": best[0].user_attrs[RESULT],
+        "confirmed": confirmed,
+    }
+
+
+def _write_results(
+    directory: RunDirectory, study: SweepStudy, tally: Tally, earlier: Plain
+) -> None:
+    trials = [
+        {
+            "trial": trial.number,
+            "fields": study.fields(trial),
+            "setting": describe(study.fields(trial)),
+            "feasible": feasible(trial),
+        }
+        | trial.user_attrs[RESULT]
+        for trial in study.finished
+    ]
+    directory.write_json("trials.json", trials)
+    _write_counts(directory, tally, earlier)
+
+
+def _write_counts(directory: RunDirectory, tally: Tally, earlier: Plain) -> None:
+    """What this command did, on top of what the commands before it did."""
+    counts: Plain = {}
+    for name, own in tally.counts().items():
+        before = earlier.get(name, {})
+        counts[name] = {k: before.get(k, 0) + own.get(k, 0) for k in sorted({*before, *own})}
+    directory.write_json("counts.json", counts)

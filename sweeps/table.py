@@ -1,0 +1,44 @@
+"""A grid's points and No-Stitch as one run, so that they are tabled like any other methods."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from analysis.report import build_report
+from orchestrator.exports import write_readable
+from orchestrator.plan import make_plan
+from orchestrator.provenance import provenance
+from orchestrator.rundir import RunDirectory, describe
+from orchestrator.spec import Spec
+from sweeps.arena import Arena
+from sweeps.candidates import NO_STITCH, group
+from sweeps.search import search_spec
+from sweeps.spec import SweepSpec
+
+
+def table_spec(sweep: SweepSpec) -> Spec:
+    """All of a grid as one run spec; UsageError where it changes models, not only the method."""
+    base = search_spec(sweep)
+    (one, *others) = group(sweep.points, base, f"sweep {sweep.name}")
+    assert not others, "check_sweep refuses tables of grids over models"
+    own = [method for method in one.spec.methods if method != NO_STITCH]
+    return replace(
+        one.spec,
+        name=sweep.name,
+        title=sweep.title,
+        methods=(NO_STITCH, *own),
+        tables=sweep.tables,
+    )
+
+
+def write_table(sweep: SweepSpec, arena: Arena, path: Path) -> None:
+    """The readable files of a run and its report; plays nothing that the search has not."""
+    spec = table_spec(sweep)
+    arena.play(spec)
+    directory, plan = RunDirectory(path), replace(make_plan(spec), illustrations={})
+    path.mkdir(parents=True, exist_ok=True)
+    directory.write_json("spec.json", describe(spec))
+    counts = write_readable(plan, arena.store, arena.ledger, directory)
+    directory.write_json("provenance.json", provenance() | {"counts": counts})
+    build_report(path)
