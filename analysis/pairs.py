@@ -35,15 +35,15 @@ def second_skills(segments: pd.DataFrame, spec: RunSpec) -> pd.DataFrame:
     """
     limit = spec.step_limits.get(2, np.inf)
     seconds = segments[(segments["depth"] == 2) & segments["method"].isin(list(spec.methods))]
-    skills = seconds["prefix"].str.split(SEPARATOR)
+    parts = [prefix.split(SEPARATOR) for prefix in seconds["prefix"]]
     success = seconds["success"].astype(bool) & (seconds["end_step"] <= limit)
     return pd.DataFrame(
         {
             "seed": seconds["seed"],
             "method": seconds["method"],
             "task": seconds["prefix"],
-            "first": skills.str[0],
-            "second": skills.str[1],
+            "first": [first for first, _ in parts],
+            "second": [second for _, second in parts],
             "episode": seconds["episode"],
             "success": success,
             "value_start": seconds["value_start"],

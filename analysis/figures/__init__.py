@@ -134,10 +134,9 @@ def _diagnosis(run: Run, folder: Path) -> list[Drawn]:
 
 
 def _first_and_last_method(run: Run) -> tuple[str, str] | None:
-    """The two methods worth a matrix each: both played most ordered pairs of skills."""
+    """The two methods worth a matrix each: both played enough ordered pairs of skills."""
     seconds = run.segments[run.segments["depth"] == 2]
     pairs = seconds.groupby("method")["prefix"].nunique()
-    skills = len(run.spec.skills)
-    most = skills * (skills - 1) / 2
-    methods = [method for method in run.spec.methods if pairs.get(method, 0) > most]
+    enough = 2 * len(run.spec.skills)
+    methods = [method for method in run.spec.methods if pairs.get(method, 0) > enough]
     return (methods[0], methods[-1]) if len(methods) > 1 else None
