@@ -78,7 +78,7 @@ def estimate(plan: Plan, store: Store, shared: Ledger) -> Estimate:
         blocks.setdefault(place.node.method, Counter())[place.standing] += 1
         if place.standing == "missing":
             missing_segments += place.arriving
-            evaluation += place.arriving * _seconds_each(place.task, history)
+            evaluation += place.arriving * seconds_each(place.task, history)
 
     runs = len(spec.methods) * spec.seeds * spec.episodes
     naive_segments = sum(len(task) for task in spec.all_tasks) * runs
@@ -138,7 +138,8 @@ def _success_rate(task: BlockTask, history: Mapping[str, Played]) -> float:
     return REFERENCE_SUCCESS[task.benchmark] if known is None else known.success_rate
 
 
-def _seconds_each(task: BlockTask, history: Mapping[str, Played]) -> float:
+def seconds_each(task: BlockTask, history: Mapping[str, Played]) -> float:
+    """What a segment of a block is expected to take a worker."""
     if task.kind in history:
         return history[task.kind].seconds_each
     return REFERENCE_SEGMENT[task.benchmark, task.method == "mb-stitch"]

@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+from orchestrator.costs import seconds_each
 from orchestrator.executors.protocol import Executor
 from orchestrator.jobs import ATTEMPTS, BlockReport, BlockTask, PlayJob, Report
 from orchestrator.ledger import Ledger, Outcome, Played
@@ -16,7 +17,6 @@ from orchestrator.store import Store
 # Blocks sent to a worker at once: few enough that little is lost with it, enough to keep it busy.
 LARGEST_BUNDLE = 64
 BUNDLE_SECONDS = 5.0
-UNKNOWN_SECONDS = 0.1  # of a segment, where none like it was ever played over this store
 
 
 @dataclass
@@ -111,8 +111,7 @@ class Evaluation:
     def _expected_seconds(self, task: BlockTask, parent: Outcome | None) -> float:
         first, end = task.episodes
         segments = end - first if parent is None else parent.survivors
-        played = self._history.get(task.kind)
-        return segments * (UNKNOWN_SECONDS if played is None else played.seconds_each)
+        return segments * seconds_each(task, self._history)
 
     def _next_key(self) -> str:
         return self.plan.tasks[self._ready[0]].key

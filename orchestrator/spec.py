@@ -7,6 +7,7 @@ import re
 import tomllib
 from dataclasses import dataclass, field
 from importlib import resources
+from importlib.resources.abc import Traversable
 from itertools import permutations
 from pathlib import Path
 from typing import Any, Literal
@@ -195,28 +196,44 @@ def _check_methods(spec: Spec, where: str) -> None:
             )
 
 
+PACKAGED = resources.files("orchestrator.specs")
+
+
 def packaged_specs() -> list[str]:
-    return sorted(
-        entry.name.removesuffix(".toml")
-        for entry in resources.files("orchestrator.specs").iterdir()
-        if entry.name.endswith(".toml")
-    )
+    return toml_names(PACKAGED)
 
 
 def load_spec(name_or_file: str, scale: Scale = "paper") -> Spec:
     """A packaged spec by name, or any TOML file, at one of its scales.
 
-    TOML holds values only, so a spec cannot execute anything. Raises UsageError for an unknown
-    name, field, scale or value, listing what is valid.
+    Raises UsageError for an unknown name, field, scale or value, listing what is valid.
     """
-    if name_or_file in packaged_specs():
-        data = resources.files("orchestrator.specs").joinpath(f"{name_or_file}.toml").read_bytes()
-        where = f"packaged spec {name_or_file}"
+    return spec_from_plain(*load_toml(name_or_file, scale, PACKAGED, "spec"))
+
+
+def toml_names(packaged: Traversable) -> list[str]:
+    """Names of the TOML files in a packaged folder, sorted."""
+    files = (entry.name for entry in packaged.iterdir())
+    return sorted(name.removesuffix(".toml") for name in files if name.endswith(".toml"))
+
+
+def load_toml(
+    name_or_file: str, scale: Scale, packaged: Traversable, what: str
+) -> tuple[Plain, str]:
+    """The content of a packaged file by name, or of any file, at a scale; and what to call it.
+
+    TOML holds values only, so a spec cannot execute anything. Raises UsageError, naming it as a
+    `what`, for an unknown name, a broken file and an unknown scale.
+    """
+    names = toml_names(packaged)
+    if name_or_file in names:
+        data = packaged.joinpath(f"{name_or_file}.toml").read_bytes()
+        where = f"packaged {what} {name_or_file}"
     elif Path(name_or_file).is_file():
         data, where = Path(name_or_file).read_bytes(), name_or_file
     else:
         raise UsageError(
-            f"no spec {name_or_file!r}: neither a file nor one of {', '.join(packaged_specs())}"
+            f"no {what} {name_or_file!r}: neither a file nor one of {', '.join(names)}"
         )
     try:
         content = tomllib.loads(data.decode())
@@ -228,7 +245,7 @@ def load_spec(name_or_file: str, scale: Scale = "paper") -> Spec:
     scales = {"paper": {}} | scales
     if scale not in scales:
         raise UsageError(f"{where}: no scale {scale!r}; it has {', '.join(scales)}")
-    return spec_from_plain(merged(content, scales[scale]) | {"scale": scale}, where)
+    return merged(content, scales[scale]) | {"scale": scale}, where
 
 
 def spec_from_plain(content: Plain, where: str) -> Spec:

@@ -54,9 +54,7 @@ class Segments:
     success: np.ndarray  # (n,) bool
     stitch_steps: np.ndarray  # (n,) int64
     steps: np.ndarray  # (n,) int64, stitching included
-    value_start: (
-        np.ndarray
-    )  # (n,) float32, this skill's before the stitch, as the stop rule sees it
+    value_start: np.ndarray  # (n,) float32, this skill's, before the stitch, to the stop rule
     value_end: np.ndarray  # (n,) float32, and after it
     snapshots: np.ndarray  # (n, snapshot) float64, at the segment's end
 

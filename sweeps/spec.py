@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 from typing import Literal
 
 from orchestrator.errors import UsageError
-from orchestrator.spec import Scale, Spec, TableSpec, load_spec, spec_from_plain
+from orchestrator.spec import (
+    Scale,
+    Spec,
+    TableSpec,
+    load_spec,
+    load_toml,
+    spec_from_plain,
+    toml_names,
+)
 from orchestrator.structure import Plain, merged, structure, to_plain
 from stitching.streams import stream
 from sweeps.space import Space, check_space, grid_points
@@ -162,12 +169,11 @@ def split_tasks(sweep: SweepSpec, base: Spec) -> tuple[list[Task], list[Task]]:
     return searched, held_out
 
 
+PACKAGED = resources.files("sweeps").joinpath("specs")
+
+
 def packaged_sweeps() -> list[str]:
-    return sorted(
-        entry.name.removesuffix(".toml")
-        for entry in resources.files("sweeps").joinpath("specs").iterdir()
-        if entry.name.endswith(".toml")
-    )
+    return toml_names(PACKAGED)
 
 
 def load_sweep(name_or_file: str, scale: Scale = "paper", trials: int | None = None) -> SweepSpec:
@@ -176,27 +182,10 @@ def load_sweep(name_or_file: str, scale: Scale = "paper", trials: int | None = N
     A base that is a file is looked for beside the sweep's own. Raises UsageError listing what is
     valid.
     """
-    if name_or_file in packaged_sweeps():
-        source = resources.files("sweeps").joinpath("specs", f"{name_or_file}.toml")
-        data, where, folder = source.read_bytes(), f"packaged sweep {name_or_file}", None
-    elif Path(name_or_file).is_file():
-        data, where = Path(name_or_file).read_bytes(), name_or_file
-        folder = Path(name_or_file).parent
-    else:
-        raise UsageError(
-            f"no sweep {name_or_file!r}: neither a file nor one of {', '.join(packaged_sweeps())}"
-        )
-    try:
-        content = tomllib.loads(data.decode())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise UsageError(f"{where}: not valid TOML: {error}") from error
-    scales = {"paper": {}} | content.pop("scales", {})
-    if scale not in scales:
-        raise UsageError(f"{where}: no scale {scale!r}; it has {', '.join(scales)}")
-    content = merged(content, scales[scale]) | {"scale": scale}
+    content, where = load_toml(name_or_file, scale, PACKAGED, "sweep")
     if trials is not None:
         content["trials"] = trials
-    base = content.get("base")
-    if folder is not None and isinstance(base, str) and (folder / base).is_file():
+    base, folder = content.get("base"), Path(where).parent
+    if where == name_or_file and isinstance(base, str) and (folder / base).is_file():
         content["base"] = str((folder / base).resolve())
     return structure(SweepSpec, content, where)

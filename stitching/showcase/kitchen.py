@@ -11,6 +11,7 @@ import torch
 from stitching.envs.kitchen import KITCHEN, KitchenBlock
 from stitching.envs.protocol import EpisodeBlock
 from stitching.models.agent import Agent
+from stitching.planning.objective import spread_over_members
 from stitching.rollout import Play, RolloutConfig, play_from_start
 from stitching.stitchers import Stitcher
 
@@ -22,7 +23,7 @@ class StepRecorder:
     """Follows every episode of a block: where all things are, and what its skill's value is."""
 
     agent: Agent
-    episodes: list[dict[str, list[Any]]] = field(default_factory=list)
+    episodes: list[dict[str, list[Any]]] = field(init=False)
 
     def __post_init__(self) -> None:
         names = ("positions", "skill", "phase", "value", "spread")
@@ -33,7 +34,7 @@ class StepRecorder:
     ) -> None:
         assert isinstance(block, KitchenBlock)
         values = self.agent.values(torch.from_numpy(block.observe(rows)), skill)
-        spread = values.std(dim=0, correction=0)
+        spread = spread_over_members(values)
         for row, at, mean, std in zip(
             episodes, block.positions(rows), values.mean(dim=0), spread, strict=True
         ):
