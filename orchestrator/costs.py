@@ -8,30 +8,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 from orchestrator.jobs import BlockTask
+from orchestrator.kits import KITS
 from orchestrator.ledger import Ledger, Played
 from orchestrator.plan import Node, Plan
 from orchestrator.recipes import Recipe
 from orchestrator.store import CorruptArtifactError, Store
 
-# Where this store has no history yet: measured on one core of a 2-core cloud machine.
-SECONDS_PER_UPDATE = {
-    ("maze", "agent"): 0.005,
-    ("maze", "mf-policy"): 0.003,
-    ("maze", "dynamics"): 0.005,
-    ("kitchen", "agent"): 0.026,
-    ("kitchen", "mf-policy"): 0.016,
-    ("kitchen", "dynamics"): 0.011,
-}
-SECONDS_PER_DEMONSTRATION = {"kitchen-demonstrations": 0.5, "kitchen-held-out": 12.0}
-REFERENCE_SECONDS = {"kitchen-diagnosis": 120.0, "kitchen-showcase": 60.0}
-OTHER_SECONDS = 1.0  # of anything else, such as data of the maze
-# By benchmark, for methods that plan and for others: a segment's seconds.
-REFERENCE_SEGMENT = {("maze", True): 0.005, ("maze", False): 0.003} | {
-    ("kitchen", True): 2.0,
-    ("kitchen", False): 0.2,
-}
-REFERENCE_SUCCESS = {"maze": 0.9, "kitchen": 0.4}  # of a skill
-BYTES_PER_SEGMENT = {"maze": 120, "kitchen": 1300}
+OTHER_SECONDS = 1.0  # of what nobody measured, such as data of the maze
 
 Standing = Literal["found", "decided", "missing"]
 
@@ -94,7 +77,7 @@ def estimate(plan: Plan, store: Store, shared: Ledger) -> Estimate:
         seconds_training=training,
         seconds_evaluation=evaluation,
         segments_missing=round(missing_segments),
-        disk_bytes=round(2 * BYTES_PER_SEGMENT[spec.benchmark] * missing_segments),
+        disk_bytes=round(2 * KITS[spec.benchmark].costs.segment_bytes * missing_segments),
         from_history=any(task.kind in history for task in plan.tasks.values()),
     )
 
@@ -135,24 +118,25 @@ def standings(plan: Plan, shared: Ledger, history: Mapping[str, Played]) -> Iter
 
 def _success_rate(task: BlockTask, history: Mapping[str, Played]) -> float:
     known = history.get(task.kind)
-    return REFERENCE_SUCCESS[task.benchmark] if known is None else known.success_rate
+    return KITS[task.benchmark].costs.success if known is None else known.success_rate
 
 
 def seconds_each(task: BlockTask, history: Mapping[str, Played]) -> float:
     """What a segment of a block is expected to take a worker."""
     if task.kind in history:
         return history[task.kind].seconds_each
-    return REFERENCE_SEGMENT[task.benchmark, task.method == "mb-stitch"]
+    costs = KITS[task.benchmark].costs
+    return costs.planned_segment if task.method == "mb-stitch" else costs.segment
 
 
 def _reference_seconds(recipe: Recipe) -> float:
-    config = recipe.params.get("config", {})
-    if (name := (recipe.params["benchmark"], recipe.kind)) in SECONDS_PER_UPDATE:
-        return SECONDS_PER_UPDATE[name] * float(config["updates"])
-    if recipe.kind in SECONDS_PER_DEMONSTRATION:
-        counted = "held_out" if recipe.kind == "kitchen-held-out" else "episodes"
-        return SECONDS_PER_DEMONSTRATION[recipe.kind] * float(config[counted])
-    return REFERENCE_SECONDS.get(recipe.kind, OTHER_SECONDS)
+    costs, config = KITS[recipe.params["benchmark"]].costs, recipe.params.get("config", {})
+    if recipe.kind in costs.update:
+        return costs.update[recipe.kind] * float(config["updates"])
+    if recipe.kind in costs.demonstration:
+        counted = "held_out" if "held-out" in recipe.kind else "episodes"
+        return costs.demonstration[recipe.kind] * float(config[counted])
+    return costs.whole.get(recipe.kind, OTHER_SECONDS)
 
 
 def _steps_in_tree(plan: Plan) -> int:

@@ -12,7 +12,6 @@ from orchestrator.errors import UsageError
 from orchestrator.structure import Plain
 from stitching.data.kitchen.demonstrations import KitchenDataConfig, Order, orders
 from stitching.data.maze import MazeDataConfig
-from stitching.envs.kitchen import SKILLS
 
 DataConfig = MazeDataConfig | KitchenDataConfig
 
@@ -32,15 +31,29 @@ class Illustration:
 
     kind: str
     inputs: tuple[str, ...]  # "agent", "dynamics", or roles of datasets and of `extras`
+    task: tuple[str, ...] = ()  # played in it, where the spec has it; empty: none is
+
+
+@dataclass(frozen=True)
+class Costs:
+    """What work costs where a store has no history yet: on one core of a 2-core cloud machine."""
+
+    update: dict[str, float]  # s of training, by kind of model
+    demonstration: dict[str, float] = field(default_factory=dict)  # s each, by kind of dataset
+    whole: dict[str, float] = field(default_factory=dict)  # s of other artifacts, by kind
+    planned_segment: float = 0.0  # s, of a method that plans
+    segment: float = 0.0  # s, of the others
+    success: float = 0.5  # of a skill
+    segment_bytes: int = 0
 
 
 @dataclass(frozen=True)
 class Kit:
     data: type[DataConfig]
     datasets: Callable[[Any], dict[str, Dataset]]  # by role, for these settings
+    costs: Costs
     extras: dict[str, str] = field(default_factory=dict)  # data not learned from: role → kind
     illustrations: dict[str, Illustration] = field(default_factory=dict)  # by name
-    shown_task: tuple[str, ...] = ()  # in the showcase, where the spec has it
     label: Callable[[Any], str] = lambda config: ""  # of unusual data; every table shows it
 
 
@@ -89,20 +102,42 @@ KITS: dict[str, Kit] = {
     "maze": Kit(
         MazeDataConfig,
         _maze_datasets,
+        Costs(
+            update={"agent": 0.005, "mf-policy": 0.003, "dynamics": 0.005},
+            planned_segment=0.005,
+            segment=0.003,
+            success=0.9,
+            segment_bytes=120,
+        ),
         illustrations={
-            "showcase": Illustration("maze-showcase", ("agent", "dynamics", "demonstrations"))
+            "showcase": Illustration(
+                "maze-showcase",
+                ("agent", "dynamics", "demonstrations"),
+                task=("g0", "g1", "g3", "g2"),  # the paper's Figure 1
+            )
         },
-        shown_task=("g0", "g1", "g3", "g2"),  # the paper's Figure 1
     ),
     "kitchen": Kit(
         KitchenDataConfig,
         _kitchen_datasets,
+        Costs(
+            update={"agent": 0.026, "mf-policy": 0.016, "dynamics": 0.011},
+            demonstration={"kitchen-demonstrations": 0.6, "kitchen-held-out": 15.0},
+            whole={"kitchen-diagnosis": 120.0, "kitchen-showcase": 60.0},
+            planned_segment=2.0,
+            segment=0.2,
+            success=0.4,
+            segment_bytes=1300,
+        ),
         extras={"held-out": "kitchen-held-out"},
         illustrations={
-            "showcase": Illustration("kitchen-showcase", ("agent", "dynamics")),
+            "showcase": Illustration(
+                "kitchen-showcase",
+                ("agent", "dynamics"),
+                task=("microwave", "kettle", "bottom burner", "hinge cabinet"),
+            ),
             "diagnosis": Illustration("kitchen-diagnosis", ("agent", "dynamics", "held-out")),
         },
         label=_kitchen_label,
-        shown_task=(SKILLS[5], SKILLS[6], SKILLS[0], SKILLS[4]),
     ),
 }

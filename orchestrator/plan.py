@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
-from orchestrator.builders import BLOCK_CODE, SETUP_CODE
+from orchestrator.builders import BLOCK_CODE, BLOCK_SETUP
 from orchestrator.jobs import BlockTask
-from orchestrator.kits import KITS, Kit
+from orchestrator.kits import KITS, Illustration
 from orchestrator.methods import METHODS, MFStitchConfig, method_name
 from orchestrator.recipes import Recipe, code_fingerprint, digest
 from orchestrator.spec import Spec
@@ -105,7 +105,7 @@ class Plan:
             "artifacts": artifacts,
             "configs": {kind: to_plain(spec.dynamics) for kind in artifacts if kind == "dynamics"},
         }
-        key = digest(content | {"code": code_fingerprint(BLOCK_CODE, SETUP_CODE)})
+        key = digest(content | {"code": code_fingerprint(BLOCK_CODE, BLOCK_SETUP)})
         return BlockTask(key=key, **content)
 
 
@@ -146,25 +146,28 @@ def make_plan(spec: Spec) -> Plan:
         there = {"agent": agents[0], "dynamics": dynamics[0], **datasets, **extras}
         for name, one in kit.illustrations.items():
             inputs = {role: there[role] for role in one.inputs}
-            illustrations[name] = add(one.kind, _illustrated(spec, kit), inputs)
+            illustrations[name] = add(one.kind, _illustrated(spec, one), inputs)
     return Plan(
         spec, recipes, agents, dynamics, mf_policies, datasets, illustrations, tuple(_nodes(spec))
     )
 
 
-def _illustrated(spec: Spec, kit: Kit) -> Plain:
-    """What an illustration may show: one task, by direct chaining and by MB-Stitch."""
-    shown = [m for m in spec.methods if method_name(m) in ("no-stitch", "mb-stitch")]
-    task = kit.shown_task
-    return {
-        "methods": {method: to_plain(spec.method_config(method)) for method in shown},
+def _illustrated(spec: Spec, illustration: Illustration) -> Plain:
+    """Parameters of an illustration; one that plays a task does so by No- and MB-Stitch."""
+    params: Plain = {
         "configs": {"dynamics": to_plain(spec.dynamics)},
         "rollout": to_plain(spec.rollout),
-        "task": task if task in spec.all_tasks else max(spec.all_tasks, key=len),
         "step_limit": spec.step_limit,
-        "horizon": spec.mb_stitch.horizon,
         "root_seed": spec.root_seed,
         "seed": 0,
+    }
+    task = illustration.task
+    if not task:
+        return params | {"horizon": spec.mb_stitch.horizon}
+    shown = [m for m in spec.methods if method_name(m) in ("no-stitch", "mb-stitch")]
+    return params | {
+        "methods": {method: to_plain(spec.method_config(method)) for method in shown},
+        "task": task if task in spec.all_tasks else max(spec.all_tasks, key=len),
     }
 
 

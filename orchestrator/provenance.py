@@ -9,7 +9,7 @@ import subprocess
 from datetime import UTC, datetime
 from pathlib import Path
 
-from orchestrator.builders import BLOCK_CODE, BUILDERS, SETUP_CODE
+from orchestrator.builders import BLOCK_CODE, BLOCK_SETUP, BUILDERS
 from orchestrator.recipes import NUMERIC_PACKAGES, code_fingerprint
 from orchestrator.structure import Plain
 
@@ -30,11 +30,9 @@ SOURCES = ("stitching", "orchestrator", "sweeps", "analysis", "pyproject.toml", 
 
 def matters() -> Plain:
     """What must not change under a run: a change may change its numbers."""
-    parts = {kind: builder.code for kind, builder in BUILDERS.items()} | {"blocks": BLOCK_CODE}
-    code = {
-        f"code that makes {kind}": code_fingerprint(modules, SETUP_CODE)[:12]
-        for kind, modules in parts.items()
-    }
+    parts = {kind: (builder.code, builder.setup) for kind, builder in BUILDERS.items()}
+    parts["blocks"] = BLOCK_CODE, BLOCK_SETUP
+    code = {f"code that makes {kind}": code_fingerprint(*of)[:12] for kind, of in parts.items()}
     packages = {name: importlib.metadata.version(name) for name in NUMERIC_PACKAGES}
     return code | packages
 

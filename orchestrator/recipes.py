@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from orchestrator.builders import BUILDERS, SETUP_CODE
+from orchestrator.builders import BUILDERS
 from orchestrator.structure import Plain
 
 METHOD_PACKAGE = "stitching"
@@ -40,12 +40,13 @@ class Recipe:
 
     @property
     def key(self) -> str:
+        builder = BUILDERS[self.kind]
         return digest(
             {
                 "kind": self.kind,
                 "params": self.params,
                 "inputs": self.inputs,
-                "code": code_fingerprint(BUILDERS[self.kind].code, SETUP_CODE),
+                "code": code_fingerprint(builder.code, builder.setup),
             }
         )
 

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 import torch
 
-from orchestrator.builders import BUILDERS, Inputs, load_models
+from orchestrator.builders import BUILDERS
+from orchestrator.builders.models import load_models
+from orchestrator.builders.parts import Inputs
 from orchestrator.jobs import BlockReport, BlockTask, BuildJob, PlayJob, Report
 from orchestrator.ledger import Outcome
 from orchestrator.methods import make_stitcher

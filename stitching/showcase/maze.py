@@ -10,9 +10,7 @@ import numpy as np
 from stitching.data.transitions import Transitions
 from stitching.envs.maze import Maze
 from stitching.envs.protocol import EpisodeBlock
-from stitching.models.agent import Agent
-from stitching.rollout import Play, RolloutConfig, play_from_start
-from stitching.stitchers import Stitcher
+from stitching.showcase.shown import Shown
 
 DEMONSTRATIONS = 10  # paths shown of each skill
 
@@ -37,30 +35,16 @@ class PathRecorder:
         self.skills.append(self.maze.skills[skill].name)
 
 
-def maze_showcase(
-    maze: Maze,
-    demonstrations: Transitions,
-    agent: Agent,
-    stitchers: dict[str, Stitcher],
-    config: RolloutConfig,
-    task: tuple[str, ...],
-    step_limit: int,
-    root_seed: int,
-    seed: int,
-) -> dict[str, Any]:
+def maze_showcase(maze: Maze, demonstrations: Transitions, shown: Shown) -> dict[str, Any]:
     """The map, some demonstrations of each skill, and one task played by each method, as JSON."""
     episodes = []
-    for method, stitcher in stitchers.items():
+    for method in shown.stitchers:
         recorder = PathRecorder(maze)
-        name, _, _ = method.partition("[")  # streams know no settings
-        play = Play(root_seed, maze.name, seed, name, (0,), task)
-        segments = play_from_start(
-            maze.block(), agent, stitcher, maze, config, play, step_limit, recorder
-        )
+        segments = shown.play(maze, method, 1, recorder)
         episodes.append(
             {
                 "method": method,
-                "task": ">".join(task),
+                "task": ">".join(shown.task),
                 "positions": recorder.positions,
                 "phases": recorder.phases,
                 "skills": recorder.skills,

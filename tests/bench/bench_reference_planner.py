@@ -36,7 +36,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from orchestrator.builders import load_models
+from orchestrator.builders.models import load_models
 from orchestrator.methods import MBStitchConfig, make_stitcher
 from orchestrator.rundir import RunDirectory
 from orchestrator.spec import Spec, load_spec

@@ -148,7 +148,7 @@ def test_unusable_data_is_refused_before_training(
         raise AssertionError("something was trained on it")
 
     for name in ("train_iql", "train_dynamics"):
-        monkeypatch.setattr(f"orchestrator.builders.{name}", untouched)
+        monkeypatch.setattr(f"orchestrator.builders.training.{name}", untouched)
     folder = place.store.path("maze-demonstrations", key)
     with pytest.raises(BadDataError, match=rf"{folder}/{complaint}") as caught:
         place.carry_out(spec)

@@ -5,7 +5,7 @@ from itertools import permutations
 
 import pytest
 
-from orchestrator.builders import BLOCK_CODE, SETUP_CODE
+from orchestrator.builders import BLOCK_CODE, BLOCK_SETUP
 from orchestrator.plan import Node, Plan, make_plan
 from orchestrator.recipes import _closure
 from orchestrator.spec import Spec, load_spec
@@ -106,9 +106,9 @@ def test_more_seeds_methods_or_tasks_touch_nothing(plan: Plan, spec: Spec) -> No
     )  # it shows other methods
 
 
-@pytest.mark.parametrize("module", [*BLOCK_CODE, *SETUP_CODE, "stitching.planning.objective"])
+@pytest.mark.parametrize("module", [*BLOCK_CODE, *BLOCK_SETUP, "stitching.planning.objective"])
 def test_blocks_are_named_by_the_code_that_plays_them(module: str) -> None:
-    assert module in _closure(BLOCK_CODE) | set(SETUP_CODE)
+    assert module in _closure(BLOCK_CODE) | set(BLOCK_SETUP)
 
 
 def test_settings_in_a_methods_name_are_settings(spec: Spec) -> None:

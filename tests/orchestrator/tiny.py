@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from unittest import mock
 
-from orchestrator.builders import load_models
+from orchestrator.builders.models import load_models
 from orchestrator.executors.serial import SerialExecutor
 from orchestrator.jobs import BuildJob, Job
 from orchestrator.ledger import Ledger, Outcome

@@ -158,14 +158,6 @@ def kept(config: KitchenDataConfig, demonstrations: list[list[Segment]]) -> list
     return [s for one in demonstrations for s in one if s.success or config.keep_failures]
 
 
-def collect(config: KitchenDataConfig, orders: Sequence[Order], seed: int) -> Transitions:
-    """Demonstrations of several skills in these orders, cut into skills.
-
-    The collection of all orders is the concatenation of the collections of each.
-    """
-    return as_transitions([s for order in orders for s in kept(config, play(config, order, seed))])
-
-
 def held_out(config: KitchenDataConfig, seed: int) -> tuple[Transitions, np.ndarray]:
     """Demonstrations of every order that no model has seen, and the state each skill began in.
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from stitching.data.kitchen.segments import Episode, Segment, as_transitions, cut
-from stitching.data.transitions import DataError, Transitions
+from stitching.data.kitchen.segments import Episode, Segment, cut
+from stitching.data.transitions import DataError
 from stitching.envs.kitchen import GOAL_RADIUS, JOINTS, KITCHEN, SKILLS, goal_distances
 
 Recording = tuple[np.ndarray, np.ndarray]  # observations (T + 1, 59), actions (T, 9)
@@ -25,12 +25,7 @@ def human_demonstrations(source: str) -> list[list[Segment]]:
     A Minari id is looked for in MINARI_DATASETS_PATH first and downloaded if it is not there.
     Raises DataError where neither works.
     """
-    return [cut(_episode(*recording)) for recording in _recordings(source)]
-
-
-def human_data(recordings: Iterable[Recording]) -> Transitions:
-    """The skills of these recordings; what follows an episode's last achievement is left out."""
-    return as_transitions([s for recording in recordings for s in cut(_episode(*recording))])
+    return [cut(as_episode(*recording)) for recording in _recordings(source)]
 
 
 def _recordings(source: str) -> list[Recording]:
@@ -78,7 +73,8 @@ def npz_recordings(path: Path) -> list[Recording]:
     ]
 
 
-def _episode(observations: np.ndarray, actions: np.ndarray) -> Episode:
+def as_episode(observations: np.ndarray, actions: np.ndarray) -> Episode:
+    """What a recording shows; DataError where it does not fit the kitchen."""
     if observations.shape != (len(actions) + 1, KITCHEN.observation_size):
         raise DataError(f"observations {observations.shape} for actions {actions.shape}")
     positions = np.hstack([observations[:, :JOINTS], observations[:, 18:39]])

@@ -1,5 +1,6 @@
 """Scripted kitchen demonstrations: true, cut where achieved, a function of seed, order, episode."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -7,12 +8,14 @@ import pytest
 
 from stitching.data.kitchen.demonstrations import (
     KitchenDataConfig,
-    collect,
     held_out,
     human_orders,
+    kept,
     orders,
+    play,
 )
 from stitching.data.kitchen.rates import RatesConfig, success_rates, summary
+from stitching.data.kitchen.segments import as_transitions
 from stitching.data.transitions import DataError, Transitions, check, concatenate
 from stitching.envs.kitchen import GOAL_RADIUS, KITCHEN, SKILLS, START, goal_distances
 
@@ -23,6 +26,10 @@ ORDERS = (
 )
 BLUR = 0.005  # more than the observation's noise moves a distance
 SHORT_ORDERS = (("kettle",), ("microwave",))
+
+
+def collect(config: KitchenDataConfig, orders: Sequence[tuple[str, ...]], seed: int) -> Transitions:
+    return as_transitions([s for order in orders for s in kept(config, play(config, order, seed))])
 
 
 @pytest.fixture(scope="module")
@@ -126,10 +133,10 @@ def test_a_missed_skill_ends_its_demonstration_and_is_kept_on_demand() -> None:
     config = replace(CONFIG, skill_steps=5)
     with pytest.raises(DataError, match="no demonstration"):
         collect(config, ORDERS, seed=0)
-    kept = collect(replace(config, keep_failures=True), ORDERS, seed=0)
-    assert kept.episode_ends.tolist() == [5, 10]
-    assert [SKILLS[skill] for skill in kept.episode_skills] == [order[0] for order in ORDERS]
-    assert not kept.episode_successes.any()
+    missed = collect(replace(config, keep_failures=True), ORDERS, seed=0)
+    assert missed.episode_ends.tolist() == [5, 10]
+    assert [SKILLS[skill] for skill in missed.episode_skills] == [order[0] for order in ORDERS]
+    assert not missed.episode_successes.any()
 
 
 @pytest.mark.parametrize("return_home", [True, False])
@@ -157,4 +164,4 @@ def test_every_demonstrator_works_from_the_start_pose() -> None:
     done = [steps > 0 for each in attempts.values() for steps in each]
     assert len(done) == 2 * len(SKILLS)
     assert np.mean(done) >= 0.9
-    assert "kettle         from start             2 of    2" in summary(attempts)
+    assert "microwave      from start             2 of    2" in summary(attempts)

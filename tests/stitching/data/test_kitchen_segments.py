@@ -10,13 +10,14 @@ from gymnasium.spaces import Box, Dict
 from minari.data_collector import EpisodeBuffer
 
 from stitching.data.kitchen.human import (
-    human_data,
+    Recording,
+    as_episode,
     human_demonstrations,
     minari_recordings,
     npz_recordings,
 )
-from stitching.data.kitchen.segments import Episode, cut
-from stitching.data.transitions import DataError, check
+from stitching.data.kitchen.segments import Episode, as_transitions, cut
+from stitching.data.transitions import DataError, Transitions, check
 from stitching.envs.kitchen import KITCHEN, SKILLS
 
 SHARED = Path(__file__).resolve().parents[4] / "shared"
@@ -62,6 +63,10 @@ def recording(steps: int = 3) -> tuple[np.ndarray, np.ndarray]:
     observations[:, 32:39] = [-0.27, 0.35, 1.62, 1.0, 0.0, 0.0, 0.0]
     observations[steps - 1 :, 31] = -0.6
     return observations, np.full((steps, 9), 2.0)
+
+
+def human_data(recordings: list[Recording]) -> Transitions:
+    return as_transitions([s for one in recordings for s in cut(as_episode(*one))])
 
 
 def test_human_data_clips_actions_and_drops_what_follows() -> None:

@@ -13,16 +13,20 @@ from stitching.envs.maze import Maze
 from stitching.models.agent import Agent
 from stitching.rollout import Play, RolloutConfig, play_from_start
 from stitching.showcase.maze import DEMONSTRATIONS, maze_showcase
+from stitching.showcase.shown import Shown
 from stitching.stitchers import Stitcher
 
 TASK, STEP_LIMIT, CONFIG = ("a", "b", "d"), 40, RolloutConfig(sample_actions=True)
 
 
 @pytest.fixture(scope="module")
-def scene(
-    maze: Maze, demonstrations: Transitions, agent: Agent, stitchers: dict[str, Stitcher]
-) -> dict[str, Any]:
-    return maze_showcase(maze, demonstrations, agent, stitchers, CONFIG, TASK, STEP_LIMIT, 0, 1)
+def shown(agent: Agent, stitchers: dict[str, Stitcher]) -> Shown:
+    return Shown(TASK, agent, stitchers, CONFIG, STEP_LIMIT, root_seed=0, seed=1)
+
+
+@pytest.fixture(scope="module")
+def scene(maze: Maze, demonstrations: Transitions, shown: Shown) -> dict[str, Any]:
+    return maze_showcase(maze, demonstrations, shown)
 
 
 def are_neighbours(first: list[int], second: list[int]) -> bool:
@@ -56,11 +60,9 @@ def test_shows_some_demonstrations_of_each_skill(
             assert len(path) == len(rows) + 1
 
 
-def test_shows_what_there_is_if_there_is_little(
-    maze: Maze, agent: Agent, stitchers: dict[str, Stitcher]
-) -> None:
+def test_shows_what_there_is_if_there_is_little(maze: Maze, shown: Shown) -> None:
     few = skill_demonstrations(maze, MazeDataConfig(episodes=2, noise=0.0), seed=0)
-    scene = maze_showcase(maze, few, agent, stitchers, CONFIG, TASK, STEP_LIMIT, 0, 1)
+    scene = maze_showcase(maze, few, shown)
     assert {len(paths) for paths in scene["demonstrations"].values()} == {2}
 
 

@@ -1,0 +1,13 @@
+"""How each kind of artifact is made, and whose code decides what is in it."""
+
+from orchestrator.builders.kitchen import KITCHEN_BUILDERS
+from orchestrator.builders.maze import MAZE_BUILDERS
+from orchestrator.builders.parts import PLANNERS, Builder
+from orchestrator.builders.training import TRAINING_BUILDERS
+
+BUILDERS: dict[str, Builder] = TRAINING_BUILDERS | MAZE_BUILDERS | KITCHEN_BUILDERS
+
+# What decides a block's outcome beside the models: Algorithm 1 and the planners,
+BLOCK_CODE = ("stitching.rollout", *PLANNERS)
+# and how they are set up, without the method's code that these import for other purposes.
+BLOCK_SETUP = ("orchestrator.builders.models", "orchestrator.methods", "orchestrator.worker")

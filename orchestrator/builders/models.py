@@ -1,0 +1,27 @@
+"""Ready models from what the store keeps of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from orchestrator.builders.parts import Inputs
+from orchestrator.structure import Plain, structure
+from stitching.data.experience import mixed_conditions
+from stitching.envs.protocol import Benchmark, conditions
+from stitching.models.agent import Agent
+from stitching.models.dynamics import Dynamics, DynamicsConfig
+
+
+def load_models(benchmark: Benchmark, configs: Plain, artifacts: Inputs) -> dict[str, Any]:
+    """Ready models by kind, from their artifacts and plain training configurations."""
+    models: dict[str, Any] = {}
+    for kind, artifact in artifacts.items():
+        if kind == "agent":
+            models[kind] = Agent(artifact.arrays, conditions(benchmark), benchmark.actions)
+        elif kind == "mf-policy":
+            pairs = mixed_conditions(conditions(benchmark))
+            models[kind] = Agent(artifact.arrays, pairs, benchmark.actions)
+        elif kind == "dynamics":
+            config = structure(DynamicsConfig, configs[kind], kind)
+            models[kind] = Dynamics(artifact.arrays, config)
+    return models

@@ -1,0 +1,42 @@
+"""What builders of several benchmarks share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from orchestrator.store import Artifact
+from orchestrator.structure import Plain
+from stitching.data.transitions import Transitions
+
+Inputs = Mapping[str, Artifact]  # by role
+
+# Modules whose code decides: the planners', and what sets up a picture or a judgement of models.
+PLANNERS = ("stitching.planning.cem", "stitching.planning.random_shooting")
+LOOKING = (
+    "orchestrator.builders.illustrations",
+    "orchestrator.builders.models",
+    "orchestrator.methods",
+)
+
+
+@dataclass(frozen=True)
+class Builder:
+    """A pure function from parameters and inputs to an artifact."""
+
+    make: Callable[[Plain, Inputs], Artifact]
+    code: tuple[str, ...]  # the modules whose code, with all they import, decides the content
+    setup: tuple[str, ...]  # those that set it up, without what they import for other purposes
+
+
+def as_artifact(data: Transitions) -> Artifact:
+    """A dataset as the store keeps it."""
+    info = {
+        "format": "columns",
+        "rows": len(data),
+        "episodes": len(data.episode_ends),
+        "successes": int(np.sum(data.episode_successes)),
+    }
+    return Artifact(data.columns(), info)
