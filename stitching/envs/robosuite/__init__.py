@@ -1,1 +1,1 @@
-"""Panda tasks of robosuite 1.5.2 (Zhu et al. 2020, arXiv:2009.12293), one action a pose to reach."""
+"""Tasks of robosuite 1.5.2 (Zhu et al. 2020, arXiv:2009.12293) for one Panda arm."""

@@ -21,11 +21,10 @@ from stitching.envs.robosuite.models import ARM, FINGERS, FINGERS_HOME, HOME, Ar
 
 START_NOISE = 0.02  # rad, standard deviation of each joint at the start
 
-# An action asks for a pose of the gripper, which points down: x, y, z in the scene's workspace,
-# a turn about the vertical, and to open (below 0) or close the fingers.
+# An action asks for a pose of the gripper, which points where the scene says: x, y, z in the
+# scene's workspace, a turn about its own axis, and to open (below 0) or close the fingers.
 ACTION_SIZE = 5
-TURN = np.pi / 4  # rad, of an action of 1
-DOWN = np.diag([1.0, -1.0, -1.0])  # the gripper's axes where the turn is 0: fingers along y
+TURN = np.pi / 2  # rad, of an action of 1
 
 CONTROL_STEPS = 5  # at most, an action
 SUBSTEPS = 50  # of 2 ms, a control step
@@ -36,7 +35,7 @@ AHEAD = 0.05  # rad, from the pose asked for: arrived
 # What an observation's first numbers are of; the scene's objects follow, 14 numbers.
 OBSERVATION_SIZE = 25
 GRIP_POSITION = slice(0, 3)  # m
-HAND_QUATERNION = slice(3, 7)  # x y z w; of the hand's body, an eighth of a turn from the gripper
+HAND_QUATERNION = slice(3, 7)  # x y z w; of the hand's body, a quarter turn from the gripper
 FINGER_POSITIONS = slice(7, 9)  # m
 FINGER_SPEEDS = slice(9, 11)  # m/s
 OBJECTS = slice(11, 25)
@@ -61,6 +60,10 @@ class Scene(Protocol):
     @property
     def workspace(self) -> np.ndarray:
         """(2, 3) m: where the gripper may be sent, lower and upper corner."""
+
+    @property
+    def pointing(self) -> np.ndarray:
+        """(3, 3) the gripper's axes, as columns, where its turn is 0; it points along the third."""
 
     @property
     def fixture_size(self) -> int:
@@ -174,7 +177,7 @@ class RobosuiteBlock:
             raise ValueError("a robosuite action is not finite: what proposed it is broken")
         alive = ~self.diverged[rows]
         rows = going = rows[alive]
-        positions, rotations, closing = poses(self.scene.workspace, actions[alive])
+        positions, rotations, closing = poses(self.scene, actions[alive])
         for _ in range(CONTROL_STEPS):
             arrived = self._control(going, positions, rotations, closing)
             left = ~arrived & ~self.diverged[going]
@@ -234,12 +237,10 @@ class RobosuiteBlock:
             seen[OBJECTS] = self.scene.objects(data)
 
 
-def poses(
-    workspace: np.ndarray, actions: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def poses(scene: Scene, actions: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What actions (n, 5) ask for: positions (n, 3) m, rotations (n, 3, 3), fingers (n,) ±1."""
     actions = np.clip(actions.astype(np.float64), -1, 1)
-    low, high = workspace
+    low, high = scene.workspace
     turn = TURN * actions[:, 3]
     turns = np.zeros((len(actions), 3, 3))
     turns[:, 0, 0] = turns[:, 1, 1] = np.cos(turn)
@@ -247,7 +248,7 @@ def poses(
     turns[:, 0, 1] = -turns[:, 1, 0]
     turns[:, 2, 2] = 1
     closing = np.where(actions[:, 4] > 0, 1.0, -1.0)
-    return low + (high - low) * (actions[:, :3] + 1) / 2, turns @ DOWN, closing
+    return low + (high - low) * (actions[:, :3] + 1) / 2, scene.pointing @ turns, closing
 
 
 def stride(here: np.ndarray, there: np.ndarray) -> np.ndarray:

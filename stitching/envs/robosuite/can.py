@@ -61,6 +61,11 @@ class Can:
         return arm_model("PickPlaceCan")
 
     @cached_property
+    def pointing(self) -> np.ndarray:
+        """Down, the fingers beside each other along y: as at the start."""
+        return np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, -1]])
+
+    @cached_property
     def workspace(self) -> np.ndarray:
         return np.array([[-0.1, -0.45, 0.82], [0.3, 0.5, 1.1]])
 
@@ -103,7 +108,7 @@ def can_pose(rng: np.random.Generator) -> np.ndarray:
         valid = False
         while not valid:
             offset = [rng.uniform(radius - half, half - radius) for half in HALF_SIZE]
-            position = BIN + [*offset, -bottom]
+            position = BIN + np.array([*offset, -bottom])
             valid = not any(
                 np.linalg.norm(position[:2] - other[:2]) <= other_radius + radius
                 and position[2] - other[2] <= other_top - bottom

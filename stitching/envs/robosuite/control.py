@@ -46,7 +46,7 @@ class Readings:
 
 
 class Body:
-    """One episode's `MjData`, and views into it: asking it anew for each costs as much as the law."""
+    """One episode's `MjData`, and views into it: to ask for each anew costs as much as the law."""
 
     def __init__(self, model: mujoco.MjModel, grip: int) -> None:
         self.data = data = mujoco.MjData(model)

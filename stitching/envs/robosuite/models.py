@@ -31,7 +31,7 @@ class ArmModel:
     torque_limits: np.ndarray  # (2, 7) N m, lower and upper
 
 
-def original(task: str, **options: Any) -> Any:  # noqa: ANN401 (robosuite has no types)
+def original(task: str, **options: Any) -> Any:
     """robosuite's own environment, poses of the gripper in the world as actions, at 10 Hz."""
     before = logging.root.manager.disable
     logging.disable(logging.WARNING)  # it warns of robots and settings that nobody asked for
