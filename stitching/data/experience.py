@@ -40,14 +40,22 @@ def skill_experience(data: Transitions, conditions: np.ndarray) -> Experience:
 def mixed_experience(data: Transitions, conditions: np.ndarray) -> Experience:
     """MF-Stitch's "mixed" dataset (4.1.2), for every ordered pair of skills at once.
 
-    For the pair (i, j): second halves of i's episodes, then first halves of j's. The paper leaves
-    conditioning and reward open; ours: the policy is conditioned on both skills' vectors, and
-    reaching the middle of one of j's demonstrations earns 1 and ends the stitch. Where one of i's
-    demonstrations ends, the data end too: bootstrapping there, from a state from which no action
-    was ever seen, makes the values diverge.
+    For the pair (i, j): second halves of i's episodes, then first halves of j's, of those that
+    succeed. The paper leaves conditioning and reward open; ours: the policy is conditioned on both
+    skills' vectors, and reaching the middle of one of j's demonstrations earns 1 and ends the
+    stitch. Where one of i's demonstrations ends, the data end too: bootstrapping there, from a
+    state from which no action was ever seen, makes the values diverge.
     """
     episodes = [
-        [rows for rows in data.episode_rows(skill) if len(rows) > 1]
+        [
+            rows
+            for rows, success in zip(
+                data.episode_rows(skill),
+                data.episode_successes[data.episode_skills == skill],
+                strict=True,
+            )
+            if success and len(rows) > 1
+        ]
         for skill in range(len(conditions))
     ]
     pieces = []
@@ -64,8 +72,11 @@ def mixed_experience(data: Transitions, conditions: np.ndarray) -> Experience:
 
 
 def skill_pairs(skills: int) -> list[tuple[int, int]]:
-    """All ordered pairs (previous, following), in the order of `mixed_conditions`."""
-    return list(permutations(range(skills), 2))
+    """All ordered pairs (previous, following), in the order of `mixed_conditions`.
+
+    Tasks are permutations of skills, save where there is but one, which can only follow itself.
+    """
+    return list(permutations(range(skills), 2)) or [(0, 0)]
 
 
 def mixed_conditions(conditions: np.ndarray) -> np.ndarray:

@@ -74,7 +74,7 @@ def mixed_rows(data: Transitions) -> list[Row]:
             condition = (*CONDITIONS[i].tolist(), *CONDITIONS[j].tolist())
             for number, (start, end) in enumerate(spans(data)):
                 middle = start + (end - start) // 2
-                if i == j or end - start < 2:
+                if i == j or end - start < 2 or not data.episode_successes[number]:
                     continue
                 if data.episode_skills[number] == i:
                     rows += [(row, condition, 0.0, row == end - 1) for row in range(middle, end)]
@@ -103,6 +103,15 @@ def test_mixed_experience(episodes: list[tuple[int, int, bool]]) -> None:
     else:
         with pytest.raises(DataError, match="no skill"):
             mixed_experience(data, CONDITIONS)
+
+
+def test_a_single_skill_follows_itself() -> None:
+    """First halves earn, second halves do not; the missed episode is no example of either."""
+    data = dataset([(4, 0, True), (4, 0, False)])
+    own = CONDITIONS[:1]
+    assert mixed_conditions(own).tolist() == [[*own[0], *own[0]]]
+    rows = sorted(row for row, _, _, _ in listed(mixed_experience(data, own)))
+    assert rows == [0, 1, 2, 3]
 
 
 @pytest.mark.parametrize("make", [skill_experience, mixed_experience])
