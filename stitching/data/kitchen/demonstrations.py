@@ -67,7 +67,9 @@ class Demonstrator:
         """Next action (9,) for what `arm` sees and the goals (7,) that hold; None at the end."""
         self._done |= achieved
         while self._todo and self._done[SKILLS.index(self._todo[0])]:
-            self._last = PROGRAMS[self._todo.pop(0)]
+            done = PROGRAMS[self._todo.pop(0)]
+            if self._moves is not None:  # else it came about by accident, and the hand is elsewhere
+                self._last = done
             self._moves, self._steps = None, 0
         if not self._todo or self._steps == self._config.skill_steps:
             return None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 
 import numpy as np
 
@@ -40,18 +41,26 @@ class Segment:
 def cut(episode: Episode, order: Order = ()) -> list[Segment]:
     """The skills of an episode, each from the end of the one before to its own first achievement.
 
-    What an episode began with, or achieved in the same step as another skill, has no segment. The
-    steps after the last achievement are one without success, of the order's first skill not done.
+    What an episode began with, or achieved in the same step as another skill, has no segment. Where
+    an order was asked for, an accident ends the demonstration: nothing is kept from the first skill
+    on that came out of turn. If there was none, the steps after the last achievement are a segment
+    without success, of the skill that was due.
     """
     when = np.where(episode.achieved.any(axis=0), episode.achieved.argmax(axis=0), -1)  # (7,)
+    shown = [skill for skill in np.argsort(when, kind="stable").tolist() if when[skill] > 0]
+    due = [SKILLS.index(name) for name in order]
+    if due:
+        pairs = takewhile(lambda pair: pair[0] == pair[1], zip(shown, due, strict=False))
+        kept = len(list(pairs))
+    else:
+        kept = len(shown)
     segments, start = [], 0
-    for skill in np.argsort(when, kind="stable").tolist():
+    for skill in shown[:kept]:
         if when[skill] > start:
             segments.append(Segment(episode, start, int(when[skill]), skill, True))
             start = int(when[skill])
-    missed = [SKILLS.index(name) for name in order if when[SKILLS.index(name)] < 0]
-    if missed and start < len(episode.actions):
-        segments.append(Segment(episode, start, len(episode.actions), missed[0], False))
+    if kept == len(shown) < len(due) and start < len(episode.actions):
+        segments.append(Segment(episode, start, len(episode.actions), due[kept], False))
     return segments
 
 

@@ -57,6 +57,15 @@ def test_the_rest_is_a_miss_of_the_orders_next_skill() -> None:
     assert cuts(shown, ("kettle",)) == missed[:1]
 
 
+def test_an_accident_ends_a_demonstration_that_was_asked_for() -> None:
+    """The motions were another skill's; people's demonstrations have no order to be out of."""
+    shown = episode(9, kettle=(2,), bottom=(4,), top=(7,))
+    order = ("kettle", "top burner", "bottom burner")
+    assert cuts(shown, order) == [("kettle", 0, 2, True)]
+    assert cuts(shown, order[1:]) == []
+    assert len(cuts(shown)) == 3
+
+
 def recording(steps: int = 3) -> tuple[np.ndarray, np.ndarray]:
     """One step before the last, the microwave is opened."""
     observations = np.zeros((steps + 1, 59), dtype=np.float32)

@@ -1,0 +1,1 @@
+"""Robosuite datasets: scripted demonstrations at four levels of quality."""

@@ -1,0 +1,155 @@
+"""One waypoint program a skill: poses to send the gripper to, one after the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from stitching.envs.robosuite.block import GRIP_POSITION, TURN
+from stitching.envs.robosuite.can import CAN_POSITION
+from stitching.envs.robosuite.door import DOOR_POSITION, HANDLE_POSITION, HANDLE_TURN
+
+OPEN, CLOSED = -1.0, 1.0  # the fingers
+
+LEVER = 0.12  # m, from the handle's axis to where it is held
+# From the door's middle, where the door is not turned: m to the right (x), out of the door (y), up.
+AXIS = np.array([0.175, 0.1, -0.025])
+REST = AXIS - [0.125, 0, 0]  # the handle's end, the handle not turned
+
+
+@dataclass(frozen=True)
+class Waypoint:
+    """A pose to be at; the gripper is sent there until it is, or until patience ends."""
+
+    at: tuple[float, float, float]  # m, in the object's frame; it is followed where it goes
+    fingers: float
+    turn: float = 0.0  # rad
+    near: float = 0.02  # m
+    patience: int = 3  # actions
+    least: int = 1  # actions, even if it is there at once: fingers need two to close
+    world: bool = False  # `at` is a place in the world
+    loose: float = 1.0  # how freely a hand would vary it, against its jitter
+
+
+W = Waypoint
+
+
+def _door(pull: float) -> tuple[Waypoint, ...]:
+    """Take the handle's end between the fingers, turn it, and pull by so much (m) all the time."""
+    angles = (0.4, 0.8, 1.2, 1.4)  # rad, of the handle
+    turning = [
+        W((LEVER - LEVER * float(np.cos(a)), 0.0, -LEVER * float(np.sin(a))), CLOSED, a, patience=1)
+        for a in angles
+    ]
+    x, _, z = turning[-1].at
+    return (
+        W((0.0, 0.2, 0.03), OPEN, near=0.05, patience=4),  # the hand swings round to face the door
+        W((0.0, 0.1, 0.0), OPEN, near=0.03, patience=4),
+        W((0.0, 0.0, 0.0), OPEN, near=0.012, loose=0.4),
+        W((0.0, 0.0, 0.0), CLOSED, least=2, loose=0.4),
+        *turning,
+        W((x, pull, z), CLOSED, angles[-1], near=0.0, patience=6, loose=0.4),
+    )
+
+
+PROGRAMS: dict[str, tuple[Waypoint, ...]] = {
+    "open door": _door(0.06),
+    "close door": _door(-0.06),
+    "can": (
+        W((0.0, 0.0, 0.1), OPEN, near=0.03, patience=8),
+        W((0.0, 0.0, 0.0), OPEN, near=0.012, loose=0.4),
+        W((0.0, 0.0, 0.0), CLOSED, least=2, loose=0.4),
+        W((0.0, 0.0, 0.12), CLOSED, near=0.0, patience=1),
+        W((0.2, 0.4, 1.02), CLOSED, near=0.03, patience=8, world=True),
+        W((0.2, 0.4, 1.0), OPEN, least=2, world=True, near=0.05),
+    ),
+}
+
+# Where to back off to after a miss, in the object's frame.
+BACK_OFF = {"open door": (0.0, 0.14, 0.0), "close door": (0.0, 0.14, 0.0), "can": (0.0, 0.0, 0.15)}
+
+
+@dataclass(frozen=True)
+class Style:
+    """How a hand varies from attempt to attempt and from action to action."""
+
+    jitter: float  # m, standard deviation of a waypoint
+    noise: float  # of an action's numbers but the fingers', standard deviation
+    slip: float  # probability that an action is a random one
+
+
+# By level of quality, from a clumsy beginner to an expert.
+STYLES = {
+    1: Style(jitter=0.03, noise=0.08, slip=0.12),
+    2: Style(jitter=0.02, noise=0.05, slip=0.06),
+    3: Style(jitter=0.01, noise=0.025, slip=0.02),
+    4: Style(jitter=0.004, noise=0.01, slip=0.0),
+}
+
+
+def object_frame(skill: str, observation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where the object of a skill is, (3,) m, and how it stands, (3, 3); a handle as if unturned."""
+    seen = observation.astype(np.float64)
+    if skill == "can":
+        return seen[CAN_POSITION], np.eye(3)
+    door = seen[DOOR_POSITION]
+    across = seen[HANDLE_POSITION] - door
+    out = np.array([AXIS[0] + (REST - AXIS)[0] * np.cos(seen[HANDLE_TURN]), AXIS[1]])
+    angle = np.arctan2(across[1], across[0]) - np.arctan2(out[1], out[0])
+    cos, sin = np.cos(angle), np.sin(angle)
+    turned = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
+    return door + turned @ REST, turned
+
+
+class Hand:
+    """Goes through a skill's program, sees where it got, and begins again after a miss."""
+
+    def __init__(
+        self, skill: str, workspace: np.ndarray, style: Style, rng: np.random.Generator
+    ) -> None:
+        self._skill, self._style, self._rng = skill, style, rng
+        self._workspace = workspace
+        self._todo: list[tuple[Waypoint, np.ndarray]] = []  # and its jitter, (3,) m
+        self._tried = 0  # actions towards the first of them
+        self._missed = False
+
+    def act(self, observation: np.ndarray) -> np.ndarray:
+        """The next action (5,) float32 for an observation (25,)."""
+        while self._todo and self._passed(observation):
+            self._todo.pop(0)
+            self._tried = 0
+        if not self._todo:
+            self._begin()
+        self._tried += 1
+        if self._rng.random() < self._style.slip:
+            return self._rng.uniform(-1, 1, 5).astype(np.float32)
+        low, high = self._workspace
+        pose = 2 * (self._place(observation) - low) / (high - low) - 1
+        waypoint = self._todo[0][0]
+        pose = np.r_[pose, waypoint.turn / TURN]
+        pose += self._style.noise * self._rng.standard_normal(4)
+        return np.clip(np.r_[pose, waypoint.fingers], -1, 1).astype(np.float32)
+
+    def _place(self, observation: np.ndarray) -> np.ndarray:
+        """Where the first waypoint is now, (3,) m."""
+        waypoint, jitter = self._todo[0]
+        if waypoint.world:
+            return waypoint.at + jitter
+        origin, turned = object_frame(self._skill, observation)
+        return origin + turned @ (waypoint.at + jitter)
+
+    def _passed(self, observation: np.ndarray) -> bool:
+        waypoint = self._todo[0][0]
+        gap = np.linalg.norm(self._place(observation) - observation[GRIP_POSITION])
+        enough = self._tried >= waypoint.least
+        return enough and bool(gap < waypoint.near or self._tried >= waypoint.patience)
+
+    def _begin(self) -> None:
+        waypoints = PROGRAMS[self._skill]
+        if self._missed:
+            waypoints = (Waypoint(BACK_OFF[self._skill], OPEN, near=0.04, least=2), *waypoints)
+        self._missed, self._tried = True, 0
+        for waypoint in waypoints:
+            jitter = self._style.jitter * waypoint.loose * self._rng.standard_normal(3)
+            self._todo.append((waypoint, jitter))
