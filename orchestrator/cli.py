@@ -125,7 +125,7 @@ def _plan(words: list[str]) -> None:
 
     command = _with_spec(PlanCommand, "plan", words)
     plan = make_plan(command.spec)
-    costs = estimate(plan, Store(command.store), Ledger(command.store / "blocks.sqlite"))
+    costs = estimate(plan, Store(command.store), Ledger.look(command.store / "blocks.sqlite"))
     for line in plan_lines(command.spec, costs, command.workers):
         OUTPUT.print(line, markup=False)
 

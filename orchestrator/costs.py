@@ -65,7 +65,10 @@ def estimate(plan: Plan, store: Store, shared: Ledger) -> Estimate:
 
     runs = len(spec.methods) * spec.seeds * spec.episodes
     naive_segments = sum(len(task) for task in spec.all_tasks) * runs
-    naive_steps = sum(spec.step_limits[len(task)] for task in spec.all_tasks) * runs
+    naive_steps = runs * sum(
+        min(spec.step_limits[len(task)], len(task) * (spec.rollout.skill_limit or spec.step_limit))
+        for task in spec.all_tasks
+    )
     return Estimate(
         artifacts={kind: (c[True], c[False]) for kind, c in artifacts.items()},
         blocks={method: dict(counts) for method, counts in blocks.items()},
@@ -140,13 +143,15 @@ def _reference_seconds(recipe: Recipe) -> float:
 
 
 def _steps_in_tree(plan: Plan) -> int:
-    """Most steps the tree can take: along each path from the root at most one step limit.
+    """Most steps the tree can take: a limit of a skill's at each node, or of a task's on each path.
 
-    A leaf's path shares its steps with its siblings'; counting a whole limit at every leaf, and
-    nothing above it, bounds the sum.
+    A leaf's path shares its steps with its siblings'; counting a whole task's limit at every leaf,
+    and nothing above it, bounds the sum.
     """
+    spec = plan.spec
     leaves = sum(1 for node in plan.nodes if node not in plan.children)
-    return leaves * plan.spec.episodes * plan.spec.step_limit
+    by_skill = len(plan.nodes) * (spec.rollout.skill_limit or spec.step_limit)
+    return spec.episodes * min(leaves * spec.step_limit, by_skill)
 
 
 def _training_history(store: Store) -> dict[tuple[str, str], float]:

@@ -53,6 +53,7 @@ class Kit:
     datasets: Callable[[Any], dict[str, Dataset]]  # by role, for these settings
     costs: Costs
     extras: dict[str, str] = field(default_factory=dict)  # data not learned from: role → kind
+    for_extras: tuple[str, ...] = ()  # settings of the data that no dataset learned from depends on
     illustrations: dict[str, Illustration] = field(default_factory=dict)  # by name
     label: Callable[[Any], str] = lambda config: ""  # of unusual data; every table shows it
 
@@ -130,6 +131,7 @@ KITS: dict[str, Kit] = {
             segment_bytes=1300,
         ),
         extras={"held-out": "kitchen-held-out"},
+        for_extras=("held_out",),
         illustrations={
             "showcase": Illustration(
                 "kitchen-showcase",

@@ -96,6 +96,11 @@ class Ledger:
             self._db.execute("PRAGMA synchronous=FULL")
             self._db.executescript(SCHEMA)
 
+    @classmethod
+    def look(cls, path: Path) -> Ledger:
+        """To read what is there, which may be nothing; makes no file."""
+        return cls(path, read_only=True) if path.exists() else cls(Path(":memory:"))
+
     def close(self) -> None:
         self._db.close()
 
@@ -154,12 +159,15 @@ class Ledger:
         """Remember which bytes an artifact had when blocks were played; returns those on record."""
         with self._transaction():
             self._db.execute("INSERT OR IGNORE INTO artifacts VALUES (?, ?)", (key, digest))
-        (known,) = self._db.execute("SELECT digest FROM artifacts WHERE key = ?", (key,)).fetchone()
+            (known,) = self._db.execute(
+                "SELECT digest FROM artifacts WHERE key = ?", (key,)
+            ).fetchone()
         return str(known)
 
     def artifacts(self) -> set[str]:
         """Keys of all artifacts that blocks were played with."""
-        return {key for (key,) in self._db.execute("SELECT key FROM artifacts")}
+        with self._storage_errors():
+            return {key for (key,) in self._db.execute("SELECT key FROM artifacts")}
 
     def record_failure(self, key: str, error: str) -> int:
         """Count a failed attempt at a block; returns how many there have been."""
@@ -172,8 +180,11 @@ class Ledger:
 
     def failures(self) -> dict[str, tuple[int, str]]:
         """Attempts and last error of every block that ever failed."""
-        rows = self._db.execute("SELECT key, attempt, error FROM failures ORDER BY key, attempt")
-        return {key: (attempt, error) for key, attempt, error in rows}
+        with self._storage_errors():
+            rows = self._db.execute(
+                "SELECT key, attempt, error FROM failures ORDER BY key, attempt"
+            )
+            return {key: (attempt, error) for key, attempt, error in rows}
 
     def forget(self, keys: Iterable[str]) -> None:
         """Remove blocks."""
@@ -197,8 +208,9 @@ class Ledger:
 
     def history(self) -> dict[str, Played]:
         """All that was ever played, by kind of segment."""
-        rows = self._db.execute("SELECT * FROM played WHERE segments > 0")
-        return {name: Played(*counts) for name, *counts in rows}
+        with self._storage_errors():
+            rows = self._db.execute("SELECT * FROM played WHERE segments > 0")
+            return {name: Played(*counts) for name, *counts in rows}
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:

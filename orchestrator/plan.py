@@ -119,10 +119,14 @@ def make_plan(spec: Spec) -> Plan:
         return recipe.key
 
     root = {"root_seed": spec.root_seed}
-    data = {"config": to_plain(spec.data), **root}
     kit = KITS[spec.benchmark]
+    settings = to_plain(spec.data)
+    learned_from = {name: x for name, x in settings.items() if name not in kit.for_extras}
     made = kit.datasets(spec.data)
-    datasets = {role: add(one.kind, data | one.params) for role, one in made.items()}
+    datasets = {
+        role: add(one.kind, {"config": learned_from, **root, **one.params})
+        for role, one in made.items()
+    }
     demonstrations = {role: datasets[role] for role, one in made.items() if one.teaches}
     seeds = range(spec.seeds)
     agents = {
@@ -142,7 +146,9 @@ def make_plan(spec: Spec) -> Plan:
                 mf_policies[seed, method] = add("mf-policy", params, demonstrations)
     illustrations = {}
     if "dynamics" in needed:
-        extras = {role: add(kind, data) for role, kind in kit.extras.items()}
+        extras = {
+            role: add(kind, {"config": settings, **root}) for role, kind in kit.extras.items()
+        }
         there = {"agent": agents[0], "dynamics": dynamics[0], **datasets, **extras}
         for name, one in kit.illustrations.items():
             inputs = {role: there[role] for role in one.inputs}
@@ -164,9 +170,14 @@ def _illustrated(spec: Spec, illustration: Illustration) -> Plain:
     task = illustration.task
     if not task:
         return params | {"horizon": spec.mb_stitch.horizon}
-    shown = [m for m in spec.methods if method_name(m) in ("no-stitch", "mb-stitch")]
+    shown = [
+        method
+        for kind in ("no-stitch", "mb-stitch")  # whatever their order in the spec
+        for method in spec.methods
+        if method_name(method) == kind
+    ]
     return params | {
-        "methods": {method: to_plain(spec.method_config(method)) for method in shown},
+        "methods": [[method, to_plain(spec.method_config(method))] for method in shown],
         "task": task if task in spec.all_tasks else max(spec.all_tasks, key=len),
     }
 

@@ -119,9 +119,6 @@ def check_spec(spec: Spec) -> None:
             raise UsageError(f"{where}: {name!r} is no name; use letters, digits, '.', '_' and '-'")
     _check_numbers(to_plain(spec), where)
     _check_tasks(spec, where)
-    for count in ("seeds", "episodes", "block_episodes"):
-        if getattr(spec, count) < 1:
-            raise UsageError(f"{where}, {count}: must be at least 1")
     _check_methods(spec, where)
     ids = [table.id for table in spec.tables]
     for table in spec.tables:
@@ -138,8 +135,15 @@ def check_spec(spec: Spec) -> None:
 
 # Wherever in a spec they stand.
 AT_LEAST_ONE = {
-    "batch_size", "elites", "execute", "hidden_layers", "horizon", "iterations", "log_every",
-    "members", "population", "updates", "width",
+    "batch_size", "block_episodes", "elites", "episodes", "execute", "hidden_layers", "horizon",
+    "iterations", "log_every", "members", "population", "seeds", "updates", "width",
+}  # fmt: skip
+
+
+# Likewise: shares, from the first to the second, which itself is allowed where it says so.
+SHARES = {
+    "dropout": "[0, 1)", "expectile": "(0, 1)", "gamma": "(0, 1]", "momentum": "[0, 1)",
+    "quality": "[0, 1]", "tau": "(0, 1]", "temperature_discount": "(0, 1]",
 }  # fmt: skip
 
 
@@ -148,9 +152,15 @@ def _check_numbers(plain: Any, where: str) -> None:
         for name, value in plain.items():
             if name in AT_LEAST_ONE and value < 1:
                 raise UsageError(f"{where}, {name}: must be at least 1")
+            if name in SHARES and not _within(value, SHARES[name]):
+                raise UsageError(f"{where}, {name}: must lie in {SHARES[name]}")
             _check_numbers(value, f"{where}, {name}")
     elif isinstance(plain, float) and not math.isfinite(plain):
         raise UsageError(f"{where}: {plain} is no finite number")
+
+
+def _within(share: float, bounds: str) -> bool:
+    return 0 < share < 1 or (share == 0 and bounds[0] == "[") or (share == 1 and bounds[-1] == "]")
 
 
 def _check_tasks(spec: Spec, where: str) -> None:

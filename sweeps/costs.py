@@ -39,7 +39,7 @@ def plan_lines(sweep: SweepSpec, store: Path) -> Iterator[str]:
 
 
 def _estimate(spec: Spec, store: Path, method: str) -> Estimate:
-    ledger = Ledger(store / "blocks.sqlite")
+    ledger = Ledger.look(store / "blocks.sqlite")
     try:
         return estimate(make_plan(replace(spec, methods=(method,))), Store(store), ledger)
     finally:

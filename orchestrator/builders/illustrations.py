@@ -26,7 +26,7 @@ def shown_task(params: Plain, inputs: Inputs) -> Shown:
         agent=models["agent"],
         stitchers={
             method: make_stitcher(method, settings, benchmark, models["agent"], models)
-            for method, settings in params["methods"].items()
+            for method, settings in params["methods"]
         },
         rollout=structure(RolloutConfig, params["rollout"], "rollout"),
         step_limit=params["step_limit"],

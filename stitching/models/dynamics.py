@@ -9,7 +9,15 @@ import torch
 from torch import Tensor
 
 from stitching.data.transitions import Transitions
-from stitching.models.layers import Precision, at_precision, init_mlp, mlp, parameters, prefixed
+from stitching.models.layers import (
+    Activation,
+    Precision,
+    at_precision,
+    init_mlp,
+    mlp,
+    parameters,
+    prefixed,
+)
 from stitching.models.scale import observation_scale
 from stitching.models.training import CurveLog, Trained, cosine
 from stitching.streams import stream
@@ -26,7 +34,7 @@ class DynamicsConfig:
     members: int = 5
     width: int = 128
     hidden_layers: int = 2
-    activation: str = "relu"  # relu in the maze, elu in Kitchen, sigmoid in Robosuite
+    activation: Activation = "relu"  # relu in the maze, elu in Kitchen, sigmoid in Robosuite
     precision: Precision = "float32"  # of the hidden layers, while training and predicting
     log_every: int = 250
 

@@ -14,8 +14,9 @@ from torch.nn import functional as F
 
 Params = dict[str, Tensor]
 Precision = Literal["float32", "bfloat16"]
+Activation = Literal["relu", "elu", "sigmoid"]
 
-ACTIVATIONS: dict[str, Callable[[Tensor], Tensor]] = {
+ACTIVATIONS: dict[Activation, Callable[[Tensor], Tensor]] = {
     "relu": F.relu,
     "elu": F.elu,
     "sigmoid": torch.sigmoid,
@@ -40,7 +41,7 @@ def init_mlp(members: int, sizes: Sequence[int], rng: np.random.Generator) -> Pa
 def mlp(
     params: Params,
     inputs: Tensor,
-    activation: str = "relu",
+    activation: Activation = "relu",
     dropout: float = 0.0,
     generator: torch.Generator | None = None,
 ) -> Tensor:

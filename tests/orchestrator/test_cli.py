@@ -151,7 +151,7 @@ def test_a_plan_of_nothing_yet(cli: Cli, tmp_path: Path) -> None:
     assert rows["agent"] == rows["dynamics"] == rows["mf-policy"] == [0, 2]
     assert rows["first skills (all)"] == [0, 16, 0]
     assert rows["MB-Stitch"] == rows["No-Stitch"] == [0, 24, 0]
-    assert not list((tmp_path / "store").glob("*/*"))
+    assert not (tmp_path / "store").exists()
 
 
 def test_a_plan_after_a_run_with_another_alpha(cli: Cli, finished: Place) -> None:

@@ -63,6 +63,13 @@ def test_nothing_is_trained_on_held_out_data(plan: Plan) -> None:
     assert not held_out & plan.needed
 
 
+def test_more_held_out_data_retrain_nothing(spec: Spec, plan: Plan) -> None:
+    more = make_plan(replace(spec, data=replace(spec.data, held_out=20)))
+    assert more.needed == plan.needed
+    assert more.illustrations["diagnosis"] != plan.illustrations["diagnosis"]
+    assert more.illustrations["showcase"] == plan.illustrations["showcase"]
+
+
 def test_other_sources_are_other_data_and_say_so(spec: Spec) -> None:
     single = replace(spec, data=KitchenDataConfig(source="single-skill"))
     assert list(make_plan(single).datasets) == [

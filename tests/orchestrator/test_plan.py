@@ -9,6 +9,9 @@ from orchestrator.builders import BLOCK_CODE, BLOCK_SETUP
 from orchestrator.plan import Node, Plan, make_plan
 from orchestrator.recipes import _closure
 from orchestrator.spec import Spec, load_spec
+from stitching.envs.kitchen import KITCHEN
+from stitching.envs.maze import MAZE
+from stitching.envs.registry import BENCHMARKS
 
 
 @pytest.fixture(scope="module")
@@ -115,3 +118,18 @@ def test_settings_in_a_methods_name_are_settings(spec: Spec) -> None:
     plain = make_plan(replace(spec, methods=("mb-stitch",)))
     named = make_plan(replace(spec, methods=("mb-stitch[alpha=20]",)))
     assert sorted(block_keys(plain).values()) == sorted(block_keys(named).values())
+
+
+def test_the_order_of_methods_does_not_choose_the_picture(spec: Spec) -> None:
+    one, other = (
+        make_plan(replace(spec, methods=methods))
+        for methods in (("no-stitch", "mb-stitch"), ("mb-stitch", "no-stitch"))
+    )
+    shown, same = (plan.recipes[plan.illustrations["showcase"]] for plan in (one, other))
+    assert shown == same
+    assert [method for method, _ in shown.params["methods"]] == ["no-stitch", "mb-stitch"]
+
+
+def test_the_registry_names_the_environments_that_data_are_made_in() -> None:
+    """Whose code is in the datasets' names, and so in all that is learned from them."""
+    assert {"maze": MAZE, "kitchen": KITCHEN}.items() <= BENCHMARKS.items()

@@ -73,6 +73,10 @@ def test_the_spec_below_is_sound(tmp_path: Path) -> None:
     [
         (SOUND + "[agent]\nlearning_rate = nan", "agent, learning_rate: nan is no finite number"),
         (SOUND + "[agent]\nupdates = 0", "agent, updates: must be at least 1"),
+        (SOUND + "[agent]\ngamma = 2.0", r"agent, gamma: must lie in \(0, 1\]"),
+        (SOUND + "[agent]\ndropout = 1.0", r"agent, dropout: must lie in \[0, 1\)"),
+        (SOUND + "[data]\nepisodes = 0", "data, episodes: must be at least 1"),
+        (SOUND + "[dynamics]\nactivation = 'tanh'", "activation"),
         (
             SOUND + "[mb_stitch.cem]\npopulation = 5\nelites = 9",
             r"cem: elites must lie in 1..population \(5\): 9",

@@ -15,7 +15,7 @@ import numpy as np
 from stitching.data.robosuite.programs import STYLES, Hand
 from stitching.data.transitions import DataError, Transitions
 from stitching.envs.protocol import skill_index
-from stitching.envs.robosuite.can import CAN, Can
+from stitching.envs.robosuite.can import Can
 from stitching.envs.robosuite.door import DOOR, SKILLS, Door
 from stitching.streams import stream
 

@@ -89,7 +89,7 @@ STYLES = {
 
 
 def object_frame(skill: str, observation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where the object of a skill is, (3,) m, and how it stands, (3, 3); a handle as if unturned."""
+    """Where a skill's object is, (3,) m, and how it stands, (3, 3); a handle as if unturned."""
     seen = observation.astype(np.float64)
     if skill == "can":
         return seen[CAN_POSITION], np.eye(3)
