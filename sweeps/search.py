@@ -7,16 +7,18 @@ from copy import copy
 from dataclasses import replace
 from math import ceil
 
+import numpy as np
 from optuna.trial import FrozenTrial
 
 from orchestrator.progress import Progress
 from orchestrator.spec import Spec
+from orchestrator.structure import Plain
 from stitching.streams import stream
 from sweeps.arena import Arena
 from sweeps.scoring import Showing, play_candidates
 from sweeps.space import describe
 from sweeps.spec import SweepSpec, base_spec, split_tasks
-from sweeps.study import RESULT, SweepStudy, wilcoxon
+from sweeps.study import RESULT, SweepStudy, expected, wilcoxon
 
 
 def search_spec(sweep: SweepSpec) -> Spec:
@@ -94,8 +96,11 @@ def _play_batch(
             going_on = [trial for trial, gains in judged if not _hopeless(study, trial, gains)]
     for trial in batch:
         showing, done = shown[trial.number]
-        played = {"pruned": done < len(parts), "rounds": done, "method": showing.method}
-        study.keep(trial, showing.result(sweep.name, str(trial.number)) | played)
+        result = showing.result(sweep.name, str(trial.number))
+        result |= {"pruned": done < len(parts), "rounds": done, "method": showing.method}
+        if result["pruned"]:
+            result[expected("gain")] = _expected_gain(study, result)
+        study.keep(trial, result)
 
 
 def _report(study: SweepStudy, trial: FrozenTrial, instances: dict[int, float]) -> None:
@@ -115,6 +120,19 @@ def _hopeless(study: SweepStudy, trial: FrozenTrial, instances: dict[int, float]
     seen = copy(trial)
     seen.intermediate_values = instances
     return wilcoxon(study.sweep).prune(study.study, seen)
+
+
+def _expected_gain(study: SweepStudy, result: Plain) -> float:
+    """What a given-up trial's gain over all tasks would be: as far from the best's as on its own.
+
+    The tasks it has played may be easier than the rest, and its plain gain would mislead a sampler.
+    """
+    ranked = study.ranked()
+    if not ranked:  # nothing keeps to the constraints yet
+        return float(result["gain"])
+    best = ranked[0].user_attrs[RESULT]
+    behind = [gain - best["tasks"][task] for task, gain in result["tasks"].items()]
+    return float(best["gain"] + np.mean(behind))
 
 
 def trial_line(study: SweepStudy, trial: FrozenTrial) -> str:

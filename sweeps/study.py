@@ -112,7 +112,8 @@ class SweepStudy:
         """Finish trials whose results are all kept, in the order of their numbers."""
         for trial in batch:
             result = self.trials[trial.number].user_attrs[RESULT]
-            self.study.tell(trial.number, [result[name] for name in self.sweep.objectives])
+            values = [result.get(expected(name), result[name]) for name in self.sweep.objectives]
+            self.study.tell(trial.number, values)
 
     def fields(self, trial: FrozenTrial) -> Fields:
         """A trial's values by field of the run spec, in the space's order."""
@@ -175,6 +176,11 @@ def _open(storage: JournalStorage, sweep: SweepSpec) -> optuna.Study:
         warnings.simplefilter("ignore", ExperimentalWarning)
         study.set_metric_names(list(sweep.objectives))  # what dashboards call them
     return study
+
+
+def expected(metric: str) -> str:
+    """Name in a given-up trial's result of what the metric would be, had it been played out."""
+    return f"expected_{metric}"
 
 
 def directions(sweep: SweepSpec) -> list[StudyDirection]:

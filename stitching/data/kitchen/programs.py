@@ -44,51 +44,49 @@ W = Waypoint
 # fmt: off
 KNOB = (  # taken between the fingers and turned with the wrist
     W((0.0, -0.14, 0.0), (0.0, 0.3, 0.0), speed=0.09),
-    W((0.0, -0.02, 0.0), (0.0, 0.3, 0.0), near=0.01, loose=0.07),
-    W((0.0, -0.02, 0.0), (0.0, 0.3, 0.0), grip=CLOSED, near=0.0, patience=4, loose=0.07),
-    W((0.0, -0.02, 0.0), (0.0, 0.3, 0.9), grip=CLOSED, near=0.0, patience=15, loose=0.07),
+    W((0.0, -0.02, 0.0), (0.0, 0.3, 0.0), near=0.01, loose=0.3),
+    W((0.0, -0.02, 0.0), (0.0, 0.3, 0.0), grip=CLOSED, near=0.0, patience=4, loose=0.3),
+    W((0.0, -0.02, 0.0), (0.0, 0.3, 0.9), grip=CLOSED, near=0.0, patience=15, loose=0.3),
 )
 PROGRAMS: dict[str, Program] = {
     "bottom burner": Program("knob2_site", KNOB),
     "top burner": Program("knob4_site", KNOB),
     "light switch": Program("light_site", (
         W((0.03, -0.15, 0.0), (0.0, 0.3, 0.0), speed=0.09),
-        W((0.01, -0.03, 0.01), (0.0, 0.3, 0.0), near=0.01, loose=0.07),
-        W((-0.14, -0.03, 0.0), (0.0, 0.3, 0.0), speed=0.08, patience=20, loose=0.07),
+        W((0.01, -0.03, 0.01), (0.0, 0.3, 0.0), near=0.01, loose=0.3),
+        W((-0.14, -0.03, 0.0), (0.0, 0.3, 0.0), speed=0.08, patience=20, loose=0.3),
     )),
     "slide cabinet": Program("slide_site", (
         W((0.03, -0.2, -0.2), (0.0, 0.4, 0.0), speed=0.09, near=0.04),
-        W((0.0, -0.1, -0.08), (0.0, 0.4, 0.0), speed=0.08, near=0.03, loose=0.12),
-        W((0.0, -0.02, -0.06), (0.0, 0.4, 0.0), near=0.01, loose=0.07),
-        W((0.25, 0.0, -0.06), (-0.2, 0.4, 0.0), speed=0.08, loose=0.07),
+        W((0.0, -0.1, -0.08), (0.0, 0.4, 0.0), speed=0.08, near=0.03, loose=0.5),
+        W((0.0, -0.02, -0.06), (0.0, 0.4, 0.0), near=0.01, loose=0.3),
+        W((0.25, 0.0, -0.06), (-0.2, 0.4, 0.0), speed=0.08, loose=0.3),
     )),
     "hinge cabinet": Program("hinge_site2", (
         W((0.0, -0.13, -0.03), speed=0.09, patience=25),
-        W((0.0, -0.01, -0.03), near=0.01, speed=0.05, loose=0.07),
-        W((0.0, -0.01, -0.03), grip=CLOSED, near=0.0, patience=5, loose=0.07),
-        W((0.07, -0.13, -0.03), grip=CLOSED, speed=0.05, near=0.03, loose=0.07),
-        W((0.18, -0.21, -0.03), grip=CLOSED, speed=0.05, near=0.03, loose=0.07),
-        W((0.31, -0.24, -0.03), grip=CLOSED, speed=0.05, near=0.03, loose=0.07),
-        W((0.42, -0.22, -0.03), grip=CLOSED, speed=0.06, near=0.0, patience=15, loose=0.07),
+        W((0.0, -0.01, -0.03), near=0.01, speed=0.05, loose=0.3),
+        W((0.0, -0.01, -0.03), grip=CLOSED, near=0.0, patience=5, loose=0.3),
+        W((0.07, -0.13, -0.03), grip=CLOSED, speed=0.05, near=0.03, loose=0.3),
+        W((0.18, -0.21, -0.03), grip=CLOSED, speed=0.05, near=0.03, loose=0.3),
+        W((0.31, -0.24, -0.03), grip=CLOSED, speed=0.05, near=0.03, loose=0.3),
+        W((0.42, -0.22, -0.03), grip=CLOSED, speed=0.06, near=0.0, patience=15, loose=0.3),
     )),
     "microwave": Program("microhandle_site", (
         W((0.03, -0.15, 0.08), speed=0.09),
-        W((0.0, 0.0, 0.08), (0.2, 0.0, 0.0), near=0.01, speed=0.05, loose=0.07),
-        W((0.0, 0.0, 0.08), (0.2, 0.0, 0.0), grip=CLOSED, near=0.0, patience=5, loose=0.07),
-        W((-0.03, -0.16, 0.07), (0.3, 0.0, 0.0), grip=CLOSED, speed=0.05, loose=0.07),
-        W((-0.11, -0.37, 0.07), (0.6, 0.0, 0.0), grip=CLOSED, speed=0.05, loose=0.07),
+        W((0.0, 0.0, 0.08), (0.2, 0.0, 0.0), near=0.01, speed=0.05, loose=0.3),
+        W((0.0, 0.0, 0.08), (0.2, 0.0, 0.0), grip=CLOSED, near=0.0, patience=5, loose=0.3),
+        W((-0.03, -0.16, 0.07), (0.3, 0.0, 0.0), grip=CLOSED, speed=0.05, loose=0.3),
+        W((-0.11, -0.37, 0.07), (0.6, 0.0, 0.0), grip=CLOSED, speed=0.05, loose=0.3),
     )),
     "kettle": Program("kettle_site", (
         W((-0.12, -0.13, -0.06), (-0.3, 0.0, 0.0), speed=0.09),
-        W((-0.09, 0.0, -0.09), (-0.3, 0.0, 0.0), near=0.01, speed=0.05, loose=0.07),
-        W((-0.09, 0.0, -0.09), (-0.3, 0.0, 0.0), grip=CLOSED, near=0.0, patience=5, loose=0.07),
-        W((-0.06, 0.1, -0.02), (-0.3, 0.0, 0.0), grip=CLOSED, loose=0.07),
-        W((-0.03, 0.3, 0.0), (-0.3, 0.0, 0.0), grip=CLOSED, speed=0.05, loose=0.07),
+        W((-0.09, 0.0, -0.09), (-0.3, 0.0, 0.0), near=0.01, speed=0.05, loose=0.3),
+        W((-0.09, 0.0, -0.09), (-0.3, 0.0, 0.0), grip=CLOSED, near=0.0, patience=5, loose=0.3),
+        W((-0.06, 0.1, -0.02), (-0.3, 0.0, 0.0), grip=CLOSED, loose=0.3),
+        W((-0.03, 0.3, 0.0), (-0.3, 0.0, 0.0), grip=CLOSED, speed=0.05, loose=0.3),
     ), leave=(-0.06, 0.0, -0.12)),  # below the handle, or the kettle hangs on the finger
 }
 # fmt: on
-
-SLIPPING = 3  # steps at most
 
 # On leaving a skill for the next.
 OPENING, LEAVING, HOMING = 4, 8, 30  # steps at most for each part of it
@@ -101,24 +99,20 @@ HOMED = 0.3  # rad of every joint from the start posture: close enough to set ou
 class Style:
     """How a hand varies from attempt to attempt and from step to step."""
 
-    jitter: float  # m, standard deviation of a waypoint in the air
+    jitter: float  # m, standard deviation of a loose waypoint
     slowest: float  # least factor on the programs' speeds; the greatest is 1.1
     pause: float  # probability of a pause at a waypoint in the air
     noise: float  # standard deviation of the action's noise
-    slip: float  # probability of a slip, a few random actions, at a step in the air
-    jerk: float  # probability of one where a skill is done and the hand has yet to let go
 
 
 def style(quality: float) -> Style:
     """From a steady expert, 1, to a hand that shakes and misses, 0."""
     sloppy = 1 - quality
     return Style(
-        jitter=0.02 + 0.1 * sloppy,
+        jitter=0.005 + 0.0225 * sloppy,
         slowest=0.8 - 0.2 * sloppy,
         pause=0.02 + 0.2 * sloppy,
         noise=0.02 + 0.14 * sloppy,
-        slip=0.2 * sloppy,
-        jerk=min(1.0, 5 * sloppy),
     )
 
 
@@ -139,19 +133,13 @@ def perform(
     while True:
         pace = rng.uniform(style.slowest, 1.1)
         if last:
-            if rng.random() < style.jerk:
-                yield from _slip(rng)
-            yield from _leave(arm, last, pace, style.jitter * rng.standard_normal(3))
+            yield from _leave(arm, last, pace)
             if return_home:
                 yield from _return_home(arm)
         last, origin = program, arm.site(program.site)
         for waypoint in program.waypoints:
             jitter = style.jitter * waypoint.loose * rng.standard_normal(3)
-            for move in _pass(arm, origin + waypoint.offset + jitter, waypoint, pace):
-                if waypoint.loose == 1 and rng.random() < style.slip:
-                    yield from _slip(rng)
-                else:
-                    yield move
+            yield from _pass(arm, origin + waypoint.offset + jitter, waypoint, pace)
             if waypoint.loose == 1 and rng.random() < style.pause:  # in the air, not in touch
                 for _ in range(rng.integers(1, 6)):
                     yield arm.bend(np.zeros_like(HOME), waypoint.grip)
@@ -166,17 +154,11 @@ def _pass(arm: Arm, position: np.ndarray, waypoint: Waypoint, pace: float) -> It
         yield arm.reach(position, hand_turn(*waypoint.turn), speed, waypoint.grip)
 
 
-def _slip(rng: np.random.Generator) -> Iterator[np.ndarray]:
-    """A few random actions (9,), as large as actions are."""
-    for _ in range(rng.integers(1, 1 + SLIPPING)):
-        yield rng.uniform(-1, 1, len(HOME) + 2)
-
-
-def _leave(arm: Arm, program: Program, pace: float, jitter: np.ndarray) -> Iterator[np.ndarray]:
+def _leave(arm: Arm, program: Program, pace: float) -> Iterator[np.ndarray]:
     for _ in range(OPENING):
         yield arm.bend(np.zeros_like(HOME), GRIP_OPEN)
     turn = arm.turn
-    there = arm.position + turn.apply(program.leave + jitter)
+    there = arm.position + turn.apply(program.leave)
     for _ in range(LEAVING):
         if np.linalg.norm(there - arm.position) < CLEAR:
             break

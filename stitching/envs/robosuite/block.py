@@ -43,6 +43,8 @@ OBJECTS = slice(11, 25)
 # What the next substep depends on, the solver's warm start included.
 PHYSICS = int(mujoco.mjtState.mjSTATE_PHYSICS) | int(mujoco.mjtState.mjSTATE_WARMSTART)
 
+TOO_FAST = 1e6  # m/s or rad/s: physics have diverged
+
 # Warnings on which MuJoCo would reset a state to the model's default pose.
 RESETTING = [
     int(mujoco.mjtWarning.mjWARN_BADQPOS),
@@ -99,9 +101,9 @@ class RobosuiteBlock:
     things stand that are part of the model. The controller has no other memory between actions. An
     observation is a function of the state: there is no noise in it.
 
-    Physics that diverge end their episode and no other: `diverged` (N,) says so, the episode keeps
-    its last sound observation, no step moves it, no goal holds in it, and its snapshot is NaN and
-    not accepted back.
+    Physics that diverge (too fast, or where MuJoCo would reset the state) end their episode and no
+    other: `diverged` (N,) says so, the episode keeps its last sound observation, no step moves it,
+    no goal holds in it, and its snapshot is NaN and not accepted back.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -200,14 +202,20 @@ class RobosuiteBlock:
             body.fingers[:] = fingers
         reading = Readings(len(rows), model.nv)
         goal = Goal(positions, rotations, self._postures[rows])
+        low, high = self.scene.arm.torque_limits
         for substep in range(SUBSTEPS):
             for index, (body, fixture) in enumerate(zip(bodies, fixtures, strict=True)):
                 place(fixture)
                 mujoco.mj_step1(model, body.data)
                 body.read(reading, index)
+            sound = np.abs(reading.velocities) < TOO_FAST  # False for NaN
+            if not sound.all():  # else the controller's solver would refuse the others too
+                wild = ~sound.all(axis=1)
+                self.diverged[rows[wild]] = True
+                reading.forget(wild)
             if substep == 0:
                 goal = Goal(stride(reading.position, positions), rotations, goal.posture)
-            wanted = np.clip(torques(reading, goal), *self.scene.arm.torque_limits)
+            wanted = np.minimum(np.maximum(torques(reading, goal), low), high)
             for body, torque in zip(bodies, wanted, strict=True):
                 body.torques[:] = torque
                 mujoco.mj_step2(model, body.data)
@@ -218,7 +226,7 @@ class RobosuiteBlock:
         for row in rows.tolist():
             data = self._pool[row].data
             bounded = (np.abs(np.r_[data.qpos, data.qvel]) <= mujoco.mjMAXVAL).all()  # not if NaN
-            self.diverged[row] = not bounded or data.warning.number[RESETTING].any()
+            self.diverged[row] |= not bounded or data.warning.number[RESETTING].any()
 
     def _kinematics(self, row: int) -> mujoco.MjData:
         self.scene.place(self._fixtures[row])

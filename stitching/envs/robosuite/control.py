@@ -18,6 +18,8 @@ DAMPING = 2 * np.sqrt(STIFFNESS)  # 1/s
 POSTURE_STIFFNESS = 10.0
 POSTURE_DAMPING = 2 * np.sqrt(POSTURE_STIFFNESS)
 
+AFTER, BEFORE = [2, 0, 1], [1, 2, 0]  # of a rotation's off-diagonal pairs, about x, y, z
+
 FINGER_SPEED = 0.2  # of the fingers' command, a control step
 # Positions held by the fingers' actuators, (2,) m: for commands from -1, open, to 1, closed.
 FINGER_MIDDLE, FINGER_SPAN = np.array([0.02, -0.02]), np.array([-0.02, 0.02])
@@ -39,10 +41,18 @@ class Readings:
         self.position = np.zeros((episodes, 3))  # m
         self.rotation = np.zeros((episodes, 3, 3))
         self.joints = np.zeros((episodes, ARM))  # rad
-        self.speeds = np.zeros((episodes, ARM))  # rad/s
+        self.velocities = np.zeros((episodes, velocities))  # rad/s, m/s
+        self.speeds = self.velocities[:, :ARM]
         self.bias = np.zeros((episodes, ARM))  # N m: gravity, Coriolis, centrifugal
         self.linear = [jacobian[:3] for jacobian in self.jacobian]
         self.angular = [jacobian[3:] for jacobian in self.jacobian]
+
+    def forget(self, unsound: np.ndarray) -> None:
+        """Put numbers that can be computed with in the place of these episodes', (n,) bool."""
+        self.mass[unsound] = np.eye(self.mass.shape[-1])
+        self.jacobian[unsound] = np.eye(6, self.mass.shape[-1])
+        for array in (self.position, self.rotation, self.joints, self.velocities, self.bias):
+            array[unsound] = 0
 
 
 class Body:
@@ -54,7 +64,7 @@ class Body:
         self._packed_mass = data.qM
         self._position = data.site_xpos[grip]
         self._rotation = data.site_xmat[grip].reshape(3, 3)
-        self._joints, self._speeds = data.qpos[:ARM], data.qvel[:ARM]
+        self._joints, self._velocities = data.qpos[:ARM], data.qvel
         self._bias = data.qfrc_bias[:ARM]
         self.torques, self.fingers = data.ctrl[:ARM], data.ctrl[ARM:]
 
@@ -65,7 +75,7 @@ class Body:
         into.position[index] = self._position
         into.rotation[index] = self._rotation
         into.joints[index] = self._joints
-        into.speeds[index] = self._speeds
+        into.velocities[index] = self._velocities
         into.bias[index] = self._bias
 
 
@@ -78,17 +88,19 @@ def torques(reading: Readings, goal: Goal) -> np.ndarray:
     """
     M, J = reading.mass[:, :ARM, :ARM], reading.jacobian[:, :, :ARM]
     Jt = J.transpose(0, 2, 1)
-    mobility = J @ np.linalg.solve(M, Jt)  # (n, 6, 6): Λ⁻¹
-    turn = goal.rotation @ reading.rotation.transpose(0, 2, 1)
-    error = np.empty((len(J), 6))
-    error[:, :3] = goal.position - reading.position
-    error[:, 3] = 0.5 * (turn[:, 2, 1] - turn[:, 1, 2])
-    error[:, 4] = 0.5 * (turn[:, 0, 2] - turn[:, 2, 0])
-    error[:, 5] = 0.5 * (turn[:, 1, 0] - turn[:, 0, 1])
-    wanted = STIFFNESS * error[:, :, None] - DAMPING * (J @ reading.speeds[:, :, None])
-    blocks = np.stack((mobility[:, :3, :3], mobility[:, 3:, 3:]), axis=1)
-    force = np.linalg.solve(blocks, wanted.reshape(-1, 2, 3, 1)).reshape(-1, 6, 1)
     home = POSTURE_STIFFNESS * (goal.posture - reading.joints) - POSTURE_DAMPING * reading.speeds
     home = home[:, :, None]
-    force -= np.linalg.solve(mobility, J @ home)
-    return (Jt @ force + M @ home)[:, :, 0] + reading.bias
+    turn = goal.rotation @ reading.rotation.transpose(0, 2, 1)
+    error = np.empty((len(J), 6, 1))
+    error[:, :3, 0] = goal.position - reading.position
+    error[:, 3:, 0] = 0.5 * (turn[:, AFTER, BEFORE] - turn[:, BEFORE, AFTER])
+    # Λ⁻¹, once in blocks for what the pose wants and once whole for what the posture must not do.
+    mobility, wanted = np.zeros((len(J), 2, 6, 6)), np.empty((len(J), 2, 6, 1))
+    whole = mobility[:, 1]
+    np.matmul(J, np.linalg.solve(M, Jt), out=whole)
+    mobility[:, 0, :3, :3] = whole[:, :3, :3]
+    mobility[:, 0, 3:, 3:] = whole[:, 3:, 3:]
+    wanted[:, 0] = STIFFNESS * error - DAMPING * (J @ reading.speeds[:, :, None])
+    wanted[:, 1] = J @ home
+    force = np.linalg.solve(mobility, wanted)
+    return (Jt @ (force[:, 0] - force[:, 1]) + M @ home)[:, :, 0] + reading.bias

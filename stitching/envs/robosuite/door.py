@@ -18,9 +18,9 @@ from stitching.envs.robosuite.block import (
 from stitching.envs.robosuite.models import ArmModel, arm_model
 
 SKILLS = ("open door", "close door")
-# rad: open above the one, as robosuite says; closed below the other, ours: pushed to, the door stops
-# at 0.182 with its latch against the frame, unless the handle is held turned by 1.25.
-OPEN, CLOSED = 0.3, 0.2
+# rad: open above the one, as robosuite says; closed below the other, which is ours. A door merely
+# pushed to stops at 0.182 with its latch against the frame: the handle has to be turned, by 1.25.
+OPEN, CLOSED = 0.3, 0.05
 WIDEST = 0.4  # rad
 
 # Where the door stands, from robosuite's sampler: uniform in each.
@@ -31,7 +31,7 @@ HALF_HEIGHT = 0.3  # m
 
 # Objects in an observation, from its number 11: door 3, handle 3, hinge 1 (rad), door from gripper
 # 3, handle from gripper 3, turn of the handle 1 (rad); m, in the world.
-HINGE = 17
+DOOR_POSITION, HANDLE_POSITION, HINGE, HANDLE_TURN = slice(11, 14), slice(14, 17), 17, 24
 
 
 @dataclass(frozen=True)

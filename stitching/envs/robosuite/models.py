@@ -17,7 +17,7 @@ HOME = np.array([0, np.pi / 16, 0, -np.pi / 2 - np.pi / 3, 0, np.pi - 0.2, np.pi
 FINGERS_HOME = np.array([0.020833, -0.020833])  # m
 
 # Bodies that PickPlaceCan parks at (10, 10, 10), where they fall to the floor and lie, and what
-# marks their places. Without them a substep takes two thirds of the time.
+# marks their places. Without them a substep takes seven tenths of the time.
 UNUSED = ("Milk", "Bread", "Cereal", "Visual")
 
 
