@@ -1,5 +1,6 @@
 """A whole reproduction on the serial executor: once, again, and after it was stopped."""
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -31,6 +32,20 @@ def test_everything_is_done_once(spec: Spec, plan: Plan, place: Place, counted: 
     assert counts["segments played"] == len(segments)
     episodes = pd.read_parquet(directory.path / "episodes.parquet")
     assert len(episodes) == len(spec.all_tasks) * len(spec.methods) * spec.seeds * spec.episodes
+
+
+def test_the_showcase_shows_what_was_evaluated(done: Place) -> None:
+    """Its episode is the first of the evaluation's: as many steps, of which as many stitched."""
+    segments = pd.read_parquet(done.out / "segments.parquet")
+    first = segments.query("seed == 0 and episode == 0").set_index(["method", "prefix"])
+    for shown in done.directory.read_json("showcase.json")["episodes"]:
+        skills, phases = np.array(shown["skills"]), np.array(shown["phases"])
+        task = shown["task"].split(">")
+        for depth, skill in enumerate(task[: shown["accomplished"] + 1], start=1):
+            played = first.loc[shown["method"] if depth > 1 else "", ">".join(task[:depth])]
+            assert played.steps == (skills == skill).sum()
+            assert played.stitch_steps == (phases[skills == skill] == "stitch").sum()
+            assert played.success == (depth <= shown["accomplished"])
 
 
 def test_again_does_nothing(spec: Spec, done: Place, counted: Counted) -> None:

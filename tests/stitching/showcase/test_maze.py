@@ -4,14 +4,13 @@ import json
 from itertools import pairwise
 from typing import Any
 
-import numpy as np
 import pytest
 
 from stitching.data.maze import MazeDataConfig, skill_demonstrations
 from stitching.data.transitions import Transitions
 from stitching.envs.maze import Maze
 from stitching.models.agent import Agent
-from stitching.rollout import Play, RolloutConfig, play_from_start
+from stitching.rollout import RolloutConfig
 from stitching.showcase.maze import DEMONSTRATIONS, maze_showcase
 from stitching.showcase.shown import Shown
 from stitching.stitchers import Stitcher
@@ -105,18 +104,3 @@ def test_stitching_comes_first_and_only_between_skills(scene: dict[str, Any]) ->
                 stitched.add(episode["method"])
     assert "no-stitch" not in stitched
     assert stitched >= {"random-stitch", "mf-stitch", "mb-stitch"}
-
-
-def test_is_what_the_evaluation_would_have_played(
-    scene: dict[str, Any], maze: Maze, agent: Agent, stitchers: dict[str, Stitcher]
-) -> None:
-    for episode in scene["episodes"]:
-        method = episode["method"]
-        play = Play(0, "maze", 1, method.partition("[")[0], (0,), TASK)
-        played = play_from_start(
-            maze.block(), agent, stitchers[method], maze, CONFIG, play, STEP_LIMIT
-        )
-        assert len(episode["phases"]) == sum(int(s.steps[0]) for s in played)
-        assert episode["phases"].count("stitch") == sum(int(s.stitch_steps[0]) for s in played)
-        assert episode["accomplished"] == sum(bool(s.success[0]) for s in played)
-        assert np.array_equal(episode["positions"][-1], played[-1].snapshots[0])
