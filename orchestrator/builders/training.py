@@ -10,7 +10,7 @@ from stitching.data.transitions import Transitions, check, concatenate
 from stitching.envs.protocol import Benchmark, conditions
 from stitching.envs.registry import BENCHMARKS
 from stitching.models.dynamics import DynamicsConfig, train_dynamics
-from stitching.models.iql import IQLConfig, train_iql
+from stitching.models.iql import IQLConfig, train_iql, train_single_tasks
 from stitching.models.training import Trained
 
 
@@ -37,7 +37,8 @@ def _agent(params: Plain, inputs: Inputs) -> Artifact:
     benchmark, data = _checked_data(params, inputs)
     config = structure(IQLConfig, params["config"], "agent")
     experience = skill_experience(data, conditions(benchmark))
-    return _trained(train_iql(experience, benchmark.actions, config, *_labels("agent", params)))
+    train = train_iql if config.multi_task else train_single_tasks
+    return _trained(train(experience, benchmark.actions, config, *_labels("agent", params)))
 
 
 def _mf_policy(params: Plain, inputs: Inputs) -> Artifact:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
 
 import numpy as np
@@ -20,6 +20,19 @@ class Experience:
     conditions: np.ndarray  # (C, condition) float32
     rewards: np.ndarray  # (K,) float32
     terminals: np.ndarray  # (K,) bool; nothing is bootstrapped beyond them
+
+    def of(self, condition: int) -> Experience:
+        """What is labelled with one of the conditions; DataError if nothing is."""
+        own = self.condition_ids == condition
+        if not own.any():
+            raise DataError(f"the dataset demonstrates nothing of skill {condition}")
+        return replace(
+            self,
+            rows=self.rows[own],
+            condition_ids=self.condition_ids[own],
+            rewards=self.rewards[own],
+            terminals=self.terminals[own],
+        )
 
 
 def skill_experience(data: Transitions, conditions: np.ndarray) -> Experience:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from copy import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -10,36 +12,64 @@ from torch import Tensor
 
 from stitching.envs.protocol import ActionSpace
 from stitching.models.iql import LOG_STD_RANGE
-from stitching.models.layers import Precision, at_precision, mlp, parameters
+from stitching.models.layers import Params, Precision, at_precision, mlp, named, parameters
+
+
+@dataclass(frozen=True)
+class Networks:
+    """What was learned together: of all skills, or of one."""
+
+    mean: Tensor  # (observation,)
+    std: Tensor
+    policy: Params
+    log_std: Tensor  # (action,)
+    v: Params
+
+    @classmethod
+    def of(cls, weights: Mapping[str, np.ndarray]) -> Networks:
+        policy = parameters(weights, "policy")
+        return cls(
+            mean=torch.from_numpy(weights["observation_mean"]),
+            std=torch.from_numpy(weights["observation_std"]),
+            log_std=policy.pop("log_std").clamp(*LOG_STD_RANGE),
+            policy=policy,
+            v=parameters(weights, "v"),
+        )
 
 
 class Agent:
-    """Policy and value ensemble over (observation, condition); frozen, without gradients."""
+    """Policy and value ensemble over (observation, condition); frozen, without gradients.
+
+    Weights of `train_iql` serve all conditions, those of `train_single_tasks` one each.
+    """
 
     def __init__(
         self, weights: dict[str, np.ndarray], conditions: np.ndarray, actions: ActionSpace
     ) -> None:
-        self._mean = torch.from_numpy(weights["observation_mean"])
-        self._std = torch.from_numpy(weights["observation_std"])
         self._conditions = torch.from_numpy(conditions)  # (C, condition)
-        self._policy = parameters(weights, "policy")
-        self._log_std = self._policy.pop("log_std").clamp(*LOG_STD_RANGE)
-        self._v = parameters(weights, "v")
         self._actions = actions
+        every = range(len(conditions))
+        if "observation_mean" in weights:
+            shared = Networks.of(weights)
+            self._networks = [shared for _ in every]
+        else:
+            self._networks = [Networks.of(named(weights, str(skill))) for skill in every]
 
     def at_precision(self, precision: Precision) -> Agent:
         """The same agent with values computed in that precision (but for their last layer)."""
         other = copy(self)
-        other._v = at_precision(self._v, precision)
+        other._networks = [replace(one, v=at_precision(one.v, precision)) for one in self._networks]
         return other
 
     def _inputs(self, states: Tensor, condition: int) -> Tensor:
-        conditions = self._conditions[condition].expand(len(states), -1)
-        return torch.cat([(states - self._mean) / self._std, conditions], dim=-1)
+        own, conditions = self._networks[condition], self._conditions[condition]
+        scaled = (states - own.mean) / own.std
+        return torch.cat([scaled, conditions.expand(len(states), -1)], dim=-1)
 
     def values(self, states: Tensor, condition: int) -> Tensor:
         """V of each member: (n, observation) → (M, n)."""
-        return mlp(self._v, self._inputs(states, condition)).squeeze(-1)
+        v = self._networks[condition].v
+        return mlp(v, self._inputs(states, condition)).squeeze(-1)
 
     def act(self, states: Tensor, condition: int, noise: np.ndarray | None) -> np.ndarray:
         """Actions (n, action) float32: the policy's mode where `noise` is None, else samples.
@@ -47,12 +77,13 @@ class Agent:
         Discrete policies turn noise (n, 1), uniform in [0, 1), into a sample by inverting the
         distribution function; Gaussian ones scale standard normal noise (n, action).
         """
-        outputs = mlp(self._policy, self._inputs(states, condition)).squeeze(0)
+        own = self._networks[condition]
+        outputs = mlp(own.policy, self._inputs(states, condition)).squeeze(0)
         if self._actions.discrete:
             return self._categorical(outputs, noise).numpy()
         mean = outputs.tanh()
         if noise is not None:
-            mean = mean + torch.from_numpy(noise) * self._log_std.exp()
+            mean = mean + torch.from_numpy(noise) * own.log_std.exp()
         return mean.clamp(-1, 1).numpy()
 
     def _categorical(self, logits: Tensor, noise: np.ndarray | None) -> Tensor:

@@ -19,7 +19,7 @@ from stitching.data.experience import Experience
 from stitching.envs.protocol import ActionSpace
 from stitching.models.layers import Params, Precision, at_precision, init_mlp, mlp, prefixed
 from stitching.models.scale import observation_scale
-from stitching.models.training import CurveLog, Trained, cosine
+from stitching.models.training import CurveLog, Curves, Trained, cosine
 from stitching.streams import stream
 
 LOG_STD_RANGE = (-5.0, 2.0)
@@ -45,6 +45,7 @@ class IQLConfig:
     policy_width: int = 0  # of the policy's; 0: as the critics
     policy_layers: int = 0
     precision: Precision = "float32"  # of the hidden layers while training
+    multi_task: bool = True  # one set of networks for all skills (Maze, Kitchen), or one a skill
     log_every: int = 500
 
 
@@ -165,6 +166,19 @@ def train_iql(
     for prefix, params in (("q", q), ("v", v), ("policy", policy | {"log_std": log_std})):
         weights |= prefixed(params, prefix)
     return Trained(weights, log.curves)
+
+
+def train_single_tasks(
+    experience: Experience, actions: ActionSpace, config: IQLConfig, *labels: str | int
+) -> Trained:
+    """Learn each skill with networks of its own (Robosuite); weights are named "skill.network"."""
+    weights: dict[str, np.ndarray] = {}
+    curves: Curves = {}
+    for skill in range(len(experience.conditions)):
+        one = train_iql(experience.of(skill), actions, config, *labels, skill)
+        weights |= {f"{skill}.{name}": array for name, array in one.weights.items()}
+        curves |= {f"{name} of skill {skill}": curve for name, curve in one.curves.items()}
+    return Trained(weights, curves)
 
 
 def minibatches(

@@ -84,10 +84,15 @@ def prefixed(params: Params, prefix: str) -> dict[str, np.ndarray]:
     return {f"{prefix}.{name}": tensor.detach().numpy() for name, tensor in params.items()}
 
 
-def parameters(weights: Mapping[str, np.ndarray], prefix: str) -> Params:
-    """The parameters that `prefixed` named."""
+def named(weights: Mapping[str, np.ndarray], prefix: str) -> dict[str, np.ndarray]:
+    """The arrays whose names begin with "prefix.", without it."""
     return {
-        name.removeprefix(f"{prefix}."): torch.from_numpy(array)
+        name.removeprefix(f"{prefix}."): array
         for name, array in weights.items()
         if name.startswith(f"{prefix}.")
     }
+
+
+def parameters(weights: Mapping[str, np.ndarray], prefix: str) -> Params:
+    """The parameters that `prefixed` named."""
+    return {name: torch.from_numpy(array) for name, array in named(weights, prefix).items()}

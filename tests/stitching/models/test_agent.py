@@ -155,3 +155,18 @@ def test_nobody_acts(space: ActionSpace) -> None:
     agent, nobody = Agent(weights(), CONDITIONS, space), torch.zeros(0, OBSERVATION)
     assert agent.act(nobody, 0, None).shape == (0, 4)
     assert agent.values(nobody, 0).shape == (MEMBERS, 0)
+
+
+@SPACES
+@pytest.mark.parametrize("condition", [0, 1])
+def test_networks_of_one_skill_each(space: ActionSpace, condition: int) -> None:
+    """Of several skills' networks, each by itself what it would be alone."""
+    apart = {
+        f"{skill}.{name}": array for skill in (0, 1) for name, array in weights(skill).items()
+    }
+    together, alone = Agent(apart, CONDITIONS, space), Agent(weights(condition), CONDITIONS, space)
+    seen = torch.from_numpy(states())
+    assert together.values(seen, condition).equal(alone.values(seen, condition))
+    assert np.array_equal(together.act(seen, condition, None), alone.act(seen, condition, None))
+    rounded = together.at_precision("bfloat16"), alone.at_precision("bfloat16")
+    assert rounded[0].values(seen, condition).equal(rounded[1].values(seen, condition))

@@ -11,7 +11,7 @@ from scipy.stats import norm
 from torch import Tensor, nn
 
 from stitching.data.experience import Experience, skill_experience
-from stitching.data.transitions import Transitions
+from stitching.data.transitions import DataError, Transitions
 from stitching.envs.protocol import ActionSpace
 from stitching.models.agent import Agent
 from stitching.models.iql import (
@@ -23,6 +23,7 @@ from stitching.models.iql import (
     iql_losses,
     minibatches,
     train_iql,
+    train_single_tasks,
 )
 from stitching.models.layers import Params, init_mlp
 from stitching.models.scale import observation_scale
@@ -358,6 +359,23 @@ def test_labels_decide_every_byte(space: ActionSpace) -> None:
         assert array.tobytes() == again.weights[name].tobytes(), name
         if name.startswith(("q.", "v.", "policy.w")):
             assert array.tobytes() != other.weights[name].tobytes(), name
+
+
+@KINDS
+def test_a_skill_by_itself_learns_from_nothing_else(space: ActionSpace) -> None:
+    """Other skills' rewards do not matter; a skill that nobody shows is named."""
+    experience = experience_of(space)
+    own = experience.condition_ids == 1
+    other = replace(experience, rewards=np.where(own, experience.rewards, 1 - experience.rewards))
+    first, second = (train_single_tasks(one, space, CONFIG, "x") for one in (experience, other))
+    assert {name.partition(".")[0] for name in first.weights} == {"0", "1"}
+    same = {name for name, w in first.weights.items() if np.array_equal(w, second.weights[name])}
+    assert {name for name in first.weights if name.startswith("1.")} <= same
+    assert "0.v.w0" not in same
+    alone = train_iql(experience.of(1), space, CONFIG, "x", 1)
+    assert all(np.array_equal(w, first.weights[f"1.{n}"]) for n, w in alone.weights.items())
+    with pytest.raises(DataError, match="nothing of skill 1"):
+        replace(experience, condition_ids=np.zeros_like(own, dtype=np.int64)).of(1)
 
 
 def test_members_learn_apart() -> None:
