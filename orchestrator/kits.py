@@ -12,8 +12,9 @@ from orchestrator.errors import UsageError
 from orchestrator.structure import Plain
 from stitching.data.kitchen.demonstrations import KitchenDataConfig, Order, orders
 from stitching.data.maze import MazeDataConfig
+from stitching.data.robosuite.demonstrations import RobosuiteDataConfig
 
-DataConfig = MazeDataConfig | KitchenDataConfig
+DataConfig = MazeDataConfig | KitchenDataConfig | RobosuiteDataConfig
 
 
 @dataclass(frozen=True)
@@ -99,6 +100,28 @@ def _sha256(file: str) -> str:
     return hashlib.sha256(Path(file).read_bytes()).hexdigest() if Path(file).is_file() else ""
 
 
+def _robosuite_kit(*task: str) -> Kit:
+    return Kit(
+        RobosuiteDataConfig,
+        lambda config: {"demonstrations": Dataset("robosuite-demonstrations")},
+        Costs(
+            update={"agent": 0.03, "mf-policy": 0.01, "dynamics": 0.01},
+            demonstration={"robosuite-demonstrations": 0.6, "robosuite-held-out": 0.6},
+            whole={"robosuite-diagnosis": 60.0, "robosuite-showcase": 60.0},
+            planned_segment=4.0,
+            segment=0.6,
+            success=0.5,
+            segment_bytes=1000,
+        ),
+        extras={"held-out": "robosuite-held-out"},
+        for_extras=("held_out",),
+        illustrations={
+            "showcase": Illustration("robosuite-showcase", ("agent", "dynamics"), task),
+            "diagnosis": Illustration("robosuite-diagnosis", ("agent", "dynamics", "held-out")),
+        },
+    )
+
+
 KITS: dict[str, Kit] = {
     "maze": Kit(
         MazeDataConfig,
@@ -142,4 +165,6 @@ KITS: dict[str, Kit] = {
         },
         label=_kitchen_label,
     ),
+    "robosuite-door": _robosuite_kit("open door", "close door"),
+    "robosuite-can": _robosuite_kit("can", "can"),
 }

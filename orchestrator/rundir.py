@@ -8,7 +8,7 @@ import json
 import os
 import socket
 import uuid
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -97,14 +97,18 @@ class RunDirectory:
 
         Raises ChangedError naming what differs: a field, a package version, the code.
         """
+        return self.claim(describe(spec), lambda: differences(self.spec(), spec))
+
+    def claim(self, description: Plain, differing: Callable[[], list[str]]) -> str:
+        """As `settle`, for whatever is described; `differing` compares it with what is there."""
         identity_path = self.path / "identity.json"
         if not identity_path.exists():
             identity = {"run_id": uuid.uuid4().hex, "matters": matters()}
-            self.write_json("spec.json", describe(spec))
+            self.write_json("spec.json", description)
             self.write_json("identity.json", identity)
             return str(identity["run_id"])
         identity = json.loads(identity_path.read_text())
-        changed = differences(self.spec(), spec)
+        changed = differing()
         before, now = identity["matters"], matters()
         changed += [
             f"{name}: {before.get(name)} → {now.get(name)}"
@@ -120,11 +124,15 @@ class RunDirectory:
 
     def spec(self) -> Spec:
         """The spec this directory was made for. UsageError where there is no run."""
+        return spec_from_plain(self.asked()["spec"], str(self.path / "spec.json"))
+
+    def asked(self) -> Plain:
+        """spec.json, of a run or a suite. UsageError where there is neither."""
         path = self.path / "spec.json"
         if not path.is_file():
             raise UsageError(f"{self.path} is no run directory: it has no spec.json")
-        plain = json.loads(path.read_text())
-        return spec_from_plain(plain["spec"], str(path))
+        plain: Plain = json.loads(path.read_text())
+        return plain
 
     def write_json(self, name: str, content: Any) -> None:
         text = json.dumps(content, sort_keys=True, indent=1, ensure_ascii=False)

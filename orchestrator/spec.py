@@ -235,6 +235,12 @@ def load_toml(
     TOML holds values only, so a spec cannot execute anything. Raises UsageError, naming it as a
     `what`, for an unknown name, a broken file and an unknown scale.
     """
+    content, where = read_toml(name_or_file, packaged, what)
+    return at_scale(content, scale, where), where
+
+
+def read_toml(name_or_file: str, packaged: Traversable, what: str) -> tuple[Plain, str]:
+    """The content of a packaged file by name, or of any file, and what to call it."""
     names = toml_names(packaged)
     if name_or_file in names:
         data = packaged.joinpath(f"{name_or_file}.toml").read_bytes()
@@ -246,20 +252,27 @@ def load_toml(
             f"no {what} {name_or_file!r}: neither a file nor one of {', '.join(names)}"
         )
     try:
-        content = tomllib.loads(data.decode())
+        return tomllib.loads(data.decode()), where
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise UsageError(f"{where}: not valid TOML: {error}") from error
-    scales = content.pop("scales", {})
+
+
+def at_scale(content: Plain, scale: Scale, where: str) -> Plain:
+    """A file's fields at one of its scales; UsageError lists those that there are."""
+    fields = {name: value for name, value in content.items() if name != "scales"}
+    scales = content.get("scales", {})
     if not isinstance(scales, dict) or not all(isinstance(s, dict) for s in scales.values()):
         raise UsageError(f"{where}, scales: expected a table of fields for each scale")
     scales = {"paper": {}} | scales
     if scale not in scales:
         raise UsageError(f"{where}: no scale {scale!r}; it has {', '.join(scales)}")
-    return merged(content, scales[scale]) | {"scale": scale}, where
+    return merged(fields, scales[scale]) | {"scale": scale}
 
 
 def spec_from_plain(content: Plain, where: str) -> Spec:
     """A spec from parsed TOML or from a run directory's spec.json."""
+    if "parts" in content:
+        raise UsageError(f"{where}: a suite of several runs; here goes one, such as one of its parts")
     benchmark = content.get("benchmark")
     if not isinstance(benchmark, str) or benchmark not in BENCHMARKS:
         raise UsageError(
@@ -271,15 +284,16 @@ def spec_from_plain(content: Plain, where: str) -> Spec:
 
 def differences(old: Spec, new: Spec) -> list[str]:
     """Human-readable list of the fields in which two specs differ."""
-    return _differences(to_plain(old), to_plain(new), "")
+    return plain_differences(to_plain(old), to_plain(new))
 
 
-def _differences(old: Any, new: Any, path: str) -> list[str]:
+def plain_differences(old: Any, new: Any, path: str = "") -> list[str]:
+    """A line for each field in which two plain values differ."""
     if isinstance(old, dict) and isinstance(new, dict):
         keys = sorted(old.keys() | new.keys(), key=str)
         return [
             line
             for key in keys
-            for line in _differences(old.get(key), new.get(key), f"{path}.{key}".lstrip("."))
+            for line in plain_differences(old.get(key), new.get(key), f"{path}.{key}".lstrip("."))
         ]
     return [] if old == new else [f"{path}: {old!r} → {new!r}"]

@@ -3,9 +3,12 @@
 from orchestrator.builders.kitchen import KITCHEN_BUILDERS
 from orchestrator.builders.maze import MAZE_BUILDERS
 from orchestrator.builders.parts import PLANNERS, Builder
+from orchestrator.builders.robosuite import ROBOSUITE_BUILDERS
 from orchestrator.builders.training import TRAINING_BUILDERS
 
-BUILDERS: dict[str, Builder] = TRAINING_BUILDERS | MAZE_BUILDERS | KITCHEN_BUILDERS
+BUILDERS: dict[str, Builder] = (
+    TRAINING_BUILDERS | MAZE_BUILDERS | KITCHEN_BUILDERS | ROBOSUITE_BUILDERS
+)
 
 # What decides a block's outcome beside the models: Algorithm 1 and the planners,
 BLOCK_CODE = ("stitching.rollout", *PLANNERS)

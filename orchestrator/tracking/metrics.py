@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from analysis.run import VARIANT
 from orchestrator.tracking.names import allowed_name
 
 if TYPE_CHECKING:
@@ -65,7 +66,14 @@ def seed_scores(episodes: pd.DataFrame, spec: RunSpec, entry: TableEntry) -> dic
 def learning_curves(method: str, seed: int, training: list[dict[str, Any]]) -> Curves:
     """Learning curves of the artifacts that this method uses under this seed."""
     kinds = {"agent", *(kind for name, kind in EXTRA_ARTIFACT.items() if method.startswith(name))}
-    used = [entry for entry in training if entry["seed"] == seed and entry["kind"] in kinds]
+    variant = method.partition(VARIANT)[2]
+    used = [
+        entry
+        for entry in training
+        if entry["seed"] == seed
+        and entry["kind"] in kinds
+        and (not variant or entry.get("part") == variant)
+    ]
     several = {e["kind"] for e in used if sum(e["kind"] == other["kind"] for other in used) > 1}
     curves: Curves = {}
     for entry in used:

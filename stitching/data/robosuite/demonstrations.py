@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -22,8 +23,9 @@ from stitching.streams import stream
 
 @dataclass(frozen=True)
 class RobosuiteDataConfig:
+    level: Literal[1, 2, 3, 4] = 1  # of the hand: 1 is clumsy and often fails, 4 an expert
     episodes: int = 100  # demonstrations a skill
-    quality: int = 3  # of the hand: 1 is clumsy and often fails, 4 an expert
+    held_out: int = 30  # more of each skill, to judge models by
     skill_steps: int = 40  # actions after which a skill counts as missed
     keep_failures: bool = True  # what a clumsy hand misses is data, too
 
@@ -36,6 +38,7 @@ class Demonstration:
     actions: np.ndarray  # (T, 5) float32
     skill: int
     success: bool
+    start: np.ndarray  # (snapshot,) float64
 
 
 def starts(benchmark: Door | Can, skill: int) -> Door | Can:
@@ -61,9 +64,10 @@ def demonstrate(
     labels = [("demonstrations", benchmark.name, seed, skill, int(number)) for number in numbers]
     block = starts(benchmark, index).block()
     block.reset([stream("environment", *label) for label in labels])
-    style = STYLES[config.quality]
+    style = STYLES[config.level]
     hands = [Hand(skill, benchmark.workspace, style, stream("hand", *label)) for label in labels]
     rows = np.arange(len(hands))
+    snapshots = block.snapshot(rows)
     seen = [[observation] for observation in block.observe(rows)]
     acted: list[list[np.ndarray]] = [[] for _ in hands]
     success = np.zeros(len(hands), dtype=bool)
@@ -80,8 +84,10 @@ def demonstrate(
         if not len(rows):
             break
     return [
-        Demonstration(np.array(o), np.array(a, dtype=np.float32).reshape(-1, 5), index, bool(done))
-        for o, a, done in zip(seen, acted, success, strict=True)
+        Demonstration(
+            np.array(o), np.array(a, dtype=np.float32).reshape(-1, 5), index, bool(done), start
+        )
+        for o, a, done, start in zip(seen, acted, success, snapshots, strict=True)
     ]
 
 
@@ -93,6 +99,27 @@ def collect(benchmark: Door | Can, config: RobosuiteDataConfig, seed: int) -> Tr
         for demonstration in demonstrate(benchmark, config, skill.name, seed)
         if len(demonstration.actions) and (demonstration.success or config.keep_failures)
     ]
+    return _as_transitions(kept)
+
+
+def held_out(
+    benchmark: Door | Can, config: RobosuiteDataConfig, seed: int
+) -> tuple[Transitions, np.ndarray]:
+    """Demonstrations that no model has seen, and the state each began in.
+
+    Those that succeeded (E episodes), and their snapshots (E, snapshot) float64.
+    """
+    numbers = range(config.episodes, config.episodes + config.held_out)
+    kept = [
+        demonstration
+        for skill in benchmark.skills
+        for demonstration in demonstrate(benchmark, config, skill.name, seed, numbers)
+        if demonstration.success
+    ]
+    return _as_transitions(kept), np.array([one.start for one in kept])
+
+
+def _as_transitions(kept: Sequence[Demonstration]) -> Transitions:
     if not any(demonstration.success for demonstration in kept):
         raise DataError("no demonstration achieves its skill: nothing to make a dataset of")
     return Transitions(

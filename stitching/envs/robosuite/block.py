@@ -39,6 +39,7 @@ HAND_QUATERNION = slice(3, 7)  # x y z w; of the hand's body, a quarter turn fro
 FINGER_POSITIONS = slice(7, 9)  # m
 FINGER_SPEEDS = slice(9, 11)  # m/s
 OBJECTS = slice(11, 25)
+GROUPS = {"gripper": slice(0, 11), "objects": OBJECTS}
 
 # What the next substep depends on, the solver's warm start included.
 PHYSICS = int(mujoco.mjtState.mjSTATE_PHYSICS) | int(mujoco.mjtState.mjSTATE_WARMSTART)

@@ -23,8 +23,8 @@ BENCHMARK = {skill.name: benchmark for benchmark in (DOOR, CAN) for skill in ben
 
 
 @cache
-def shown(skill: str, quality: int) -> list[Demonstration]:
-    config = RobosuiteDataConfig(episodes=EPISODES, quality=quality)
+def shown(skill: str, level: int) -> list[Demonstration]:
+    config = RobosuiteDataConfig(episodes=EPISODES, level=level)
     return demonstrate(BENCHMARK[skill], config, skill, 0)
 
 
@@ -44,14 +44,14 @@ def test_experts_succeed_within_half_a_task(skill: str) -> None:
 def test_beginners_often_fail() -> None:
     """Over all three skills: each alone is a handful of episodes."""
     rates = {
-        quality: np.mean([one.success for skill in PROGRAMS for one in shown(skill, quality)])
-        for quality in (1, 4)
+        level: np.mean([one.success for skill in PROGRAMS for one in shown(skill, level)])
+        for level in (1, 4)
     }
     assert 0.1 < rates[1] < 0.7 < rates[4]
 
 
 def test_an_episode_depends_on_its_own_number_alone() -> None:
-    config = RobosuiteDataConfig(episodes=EPISODES, quality=1)
+    config = RobosuiteDataConfig(episodes=EPISODES, level=1)
     (alone,) = demonstrate(DOOR, config, "close door", 0, [3])
     together = shown("close door", 1)[3]
     assert alone.observations.tobytes() == together.observations.tobytes()
@@ -96,7 +96,7 @@ def test_the_handles_frame_follows_the_door_and_not_the_handle() -> None:
 
 @pytest.mark.parametrize("benchmark", [DOOR, CAN], ids=lambda benchmark: benchmark.name)
 def test_a_collection_can_be_trained_on(benchmark: Door | Can) -> None:
-    config = RobosuiteDataConfig(episodes=3, quality=3, skill_steps=18)
+    config = RobosuiteDataConfig(episodes=3, level=3, skill_steps=18)
     data = collect(benchmark, config, 0)
     check(data, benchmark, "here")
     assert len(data.episode_ends) == 3 * len(benchmark.skills)
