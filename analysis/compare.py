@@ -9,6 +9,7 @@ from analysis.episodes import episodes_from_segments
 from analysis.rows import place_tasks
 from analysis.run import RunError, RunSpec, load_run
 from analysis.statistics import generator, paired_gain
+from analysis.writers import BOOTSTRAP, seed_note
 
 COLUMNS = [
     "table", "row", "method", "score_a", "score_b", "b_minus_a", "ci_low", "ci_high",
@@ -75,9 +76,9 @@ def comparison_markdown(comparison: pd.DataFrame, name_a: str, name_b: str) -> s
     lines = [
         f"# A: {name_a}, B: {name_b}",
         "",
-        "Paired over the (seed, task, episode) both runs played; 95 % intervals from a "
-        "hierarchical bootstrap. Above zero, B scores higher. A difference is marked “apart” if "
-        "its interval leaves out zero.",
+        f"Paired over the (seed, task, episode) both runs played; 95 % intervals from {BOOTSTRAP}. "
+        f"{seed_note(int(comparison['seeds'].min()))} Above zero, B scores higher. A difference is "
+        "marked “apart” if its interval leaves out zero.",
     ]
     for table, part in comparison.groupby("table", sort=False):
         lines += ["", f"## {table}", "", f"| Task | Method | A: {name_a} | B: {name_b} | B − A | "

@@ -42,14 +42,15 @@ def episodes_from_segments(
     given_up = list(quarantine)
     if segments.duplicated(["seed", "method", "prefix", "episode"]).any():
         raise RunError("segments.parquet holds a segment twice: the run directory is damaged")
-    prefixes = _prefixes(spec.tasks)
-    lengths = sorted({task_length(task) for task in spec.tasks})
     frames = []
-    for method in spec.methods:
-        nodes = _nodes_of_method(segments, method, prefixes, spec, given_up)
-        for length in lengths:
-            tasks = [task for task in spec.tasks if task_length(task) == length]
-            frames.append(_play(nodes, method, tasks, prefixes, spec))
+    for part in spec.by_part:
+        prefixes = _prefixes(part.tasks)
+        lengths = sorted({task_length(task) for task in part.tasks})
+        for method in part.methods:
+            nodes = _nodes_of_method(segments, method, prefixes, part, given_up)
+            for length in lengths:
+                tasks = [task for task in part.tasks if task_length(task) == length]
+                frames.append(_play(nodes, method, tasks, prefixes, part))
     return pd.concat(frames, ignore_index=True)
 
 

@@ -15,8 +15,8 @@ from analysis.page_tables import claims_html, gains_html, html_table, scores_htm
 from analysis.run import Run
 from analysis.skills import permutation_scores, single_skill_rates
 from analysis.tables import Table
-from analysis.verdicts import EXPLANATION, error_reading
-from analysis.writers import describe, seed_note
+from analysis.verdicts import error_reading, explanation
+from analysis.writers import BOOTSTRAP, describe, seed_note
 
 OF_MODELS = ("diagnosis", "diagnosis-values")
 """Figures that stand beside what they are about, and not with those of the whole run."""
@@ -65,7 +65,7 @@ def render_page(
         "skills": ("Single skills", _single_skills(run)),
         "every-task": ("Every permutation", _permutation_section(run)),
         "provenance": ("Provenance", _provenance(run.provenance)),
-        "reading": ("How to read this", _reading(run)),
+        "reading": ("How to read this", _reading(run, tables)),
     }
     sections = {name: section for name, section in sections.items() if section[1]}
     template = Template(_asset("report.html"))
@@ -129,7 +129,7 @@ def _quarantine(run: Run) -> str:
 
 
 def _table_section(table: Table, drawn: list[Drawn], figures: Path) -> str:
-    notes = [*describe(table), EXPLANATION, error_reading(table.scores)]
+    notes = [*describe(table), explanation(table), error_reading(table.scores)]
     return "".join(
         [
             f'<p class="notice">{escape(notes.pop(0))}</p>' if table.missing else "",
@@ -170,7 +170,8 @@ def _single_skills(run: Run) -> str:
     ]
     return (
         '<p class="note">How often each skill succeeds when it comes first, over all seeds, with '
-        "Wilson's 95 % interval. It takes episodes as independent; seeds may differ by more.</p>"
+        "Wilson's 95 % interval. It takes episodes as independent and covers other episodes of the "
+        "models trained here; other training runs may differ by far more.</p>"
         + html_table(["Skill", "Played by", "Successes", "Rate", "95 % interval"], lines)
     )
 
@@ -229,15 +230,18 @@ def _flatten(value: Any, name: str = "") -> list[tuple[str, str]]:
     ]
 
 
-def _reading(run: Run) -> str:
+def _reading(run: Run, tables: list[Table]) -> str:
+    fewest = min((table.fewest_seeds for table in tables), default=len(run.spec.seeds))
     paragraphs = [
         "A score is accomplished skills divided by skills in the task, in order: once a skill is "
         "missed, nothing after it counts.",
-        "Intervals come from 1,000 resamples of seeds, then of each seed's tasks, then of each "
-        "task's episodes. A seed retrains everything and serves every task, so it is the unit "
-        f"that matters. {seed_note(len(run.spec.seeds))}",
+        f"Intervals come from 1,000 resamples: {BOOTSTRAP}. A seed retrains everything and serves "
+        "every task, so it is the unit that matters; tasks with a common beginning are the same "
+        "episodes for so long, so a thousand of them are no thousand witnesses. "
+        f"{seed_note(fewest)}",
         "Gains are paired: methods meet the same random numbers of the environment in the same "
-        "(seed, task, episode), and the interval is that of the difference.",
+        "(seed, task, episode), first skills are the same episodes for most, and the interval is "
+        "that of the difference.",
         "Environments, data and unpublished details are our own: agreement with the paper means "
         "the same effect under the same protocol, not the same random numbers.",
     ]

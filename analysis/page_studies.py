@@ -8,7 +8,7 @@ import pandas as pd
 from analysis.page_tables import html_table
 from analysis.pairs import BASELINE, shown_orders
 from analysis.run import Run
-from analysis.writers import Record
+from analysis.writers import Record, seed_note
 
 UNKNOWN = "–"
 
@@ -34,7 +34,9 @@ def pairs_section(run: Run, groups: pd.DataFrame | None) -> str:
         "skills follow one another in some demonstration. In rates and gains every pair weighs "
         "the same, and every seed, so a rate may differ a little from successes over trials. "
         f"Methods share their first skills; gains over {baseline} are paired by seed, pair and "
-        "episode. 95 % intervals are from resampling seeds, then pairs, then episodes."
+        "episode. 95 % intervals are from resampling seeds, and within a seed each first skill's "
+        "episodes, together for all pairs that begin with it; pairs are fixed. "
+        f"{seed_note(int(groups['seeds'].min()))}"
     ) + html_table(header, lines)
 
 
@@ -81,7 +83,8 @@ def _skills(run: Run, known: Known) -> str:
         "<h3>Policies and values</h3>"
         + html_table(header, lines)
         + _note(
-            "Successes of trials, with Wilson's 95 % interval, which takes trials as independent. "
+            "Successes of trials, with Wilson's 95 % interval, which takes trials as independent "
+            "and covers the models trained here: other training runs may differ by far more. "
             f"Own starts are where the skill's held-out demonstrations begin{_starts(run)}; the "
             f"start pose is that of an episode{' (*: in the data)' if starting else ''}; after "
             f"other skills is {baseline}, over all pairs. ρ: rank correlation of value with time "

@@ -4,7 +4,7 @@ import math
 from html import escape
 
 from analysis.tables import Table
-from analysis.verdicts import NO_DATA, NOT_PRINTED, cell_verdicts, claims
+from analysis.verdicts import HOLDS, NO_DATA, NOT_PRINTED, ONE_SEED, cell_verdicts, claims
 from analysis.writers import Record, gain_texts, paper_text, short_of
 
 
@@ -67,14 +67,16 @@ def claims_html(table: Table) -> str:
     if not found:
         return ""
     items = "".join(
-        f'<li><span class="verdict {claim.verdict.replace(" ", "-")}">{claim.verdict}</span> '
+        f'<li><span class="verdict {claim.verdict.replace(" ", "-")}">{claim.judgement}</span> '
         f"{escape(claim.text)}"
         f'<span class="aside" style="white-space: normal">{escape(claim.detail)}</span></li>'
         for claim in found
     )
-    held = sum(claim.verdict == "holds" for claim in found)
+    held = sum(claim.verdict == HOLDS for claim in found)
+    whose = f" {ONE_SEED}" if any(claim.seeds == 1 for claim in found) else ""
     return (
-        f'<h3>The paper\'s claims: {held} of {len(found)} hold</h3><ul class="claims">{items}</ul>'
+        f"<h3>The paper's claims: {held} of {len(found)} hold{whose}</h3>"
+        f'<ul class="claims">{items}</ul>'
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.run import SEPARATOR, RunSpec
-from analysis.statistics import count_scores, estimate, generator, paired_gain
+from analysis.statistics import arrange, estimate, generator, paired_gain
 
 BASELINE = "no-stitch"
 IN_DATA, OTHER, ALL = "pairs in the data", "other pairs", "all pairs"
@@ -75,7 +75,8 @@ def pair_groups(seconds: pd.DataFrame, orders: Orders, spec: RunSpec) -> pd.Data
 
     Columns group, method, pairs, successes, trials, rate, ci_low, ci_high, gain, gain_low,
     gain_high, seeds. In rates and gains every pair weighs the same, and every seed. The gain is
-    over No-Stitch, paired over the episodes both played; intervals are of 95 %.
+    over No-Stitch, paired over the episodes both played; intervals are of 95 % and take
+    the pairs as fixed (see `analysis.statistics.bootstrap_means`).
     """
     shown = shown_pairs(orders)
     known = np.array(
@@ -98,10 +99,7 @@ def pair_groups(seconds: pd.DataFrame, orders: Orders, spec: RunSpec) -> pd.Data
 def _group_numbers(
     part: pd.DataFrame, members: pd.DataFrame, group: str, method: str
 ) -> tuple[float, ...]:
-    scores = count_scores(
-        part["accomplished"].to_numpy(dtype=float), part["seed"].to_numpy(), part["task"].to_numpy()
-    )
-    rate = estimate(scores, generator("pairs", group, method))
+    rate = estimate(arrange(part, "accomplished"), generator("pairs", group, method))
     others = members[members["method"] == (BASELINE if method != BASELINE else None)]
     gain = paired_gain(part, others, generator("pairs gain", group, method))
     return (

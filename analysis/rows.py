@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING, Protocol
 
 from analysis.run import SEPARATOR, VARIANT, RunError, RunSpec, TableEntry, task_length
@@ -90,10 +91,11 @@ def place_tasks(spec: RunSpec, table: TableEntry) -> pd.DataFrame:
 
     check_tables([table])
     rule = ROW_RULES[table.rows]
+    asked = {pair for part in spec.by_part for pair in product(part.methods, part.tasks)}
     places = [
         (rule(task, method, spec, table), task, method)
-        for method in spec.methods
-        for task in spec.tasks
+        for method, task in product(spec.methods, spec.tasks)
+        if (method, task) in asked
     ]
     places.sort(key=lambda place: place[0].order)
     return pd.DataFrame(

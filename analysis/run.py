@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,6 +38,17 @@ class TableEntry:
 
 
 @dataclass(frozen=True)
+class PartEntry:
+    """One of several runs that were merged: who played what there, and when it was cut."""
+
+    label: str
+    methods: tuple[str, ...]
+    tasks: tuple[str, ...]
+    step_limits: Mapping[int, int]
+    block_episodes: int
+
+
+@dataclass(frozen=True)
 class RunSpec:
     """What was asked of a run: the part of `spec.json` that its tables depend on."""
 
@@ -55,6 +66,7 @@ class RunSpec:
     skill_labels: Mapping[str, str] = field(default_factory=dict)
     own_first_skill: frozenset[str] = frozenset()  # methods whose first skill nobody shares
     block_episodes: int = 1  # episodes that are played, and lost, together
+    parts: tuple[PartEntry, ...] = ()  # the runs that this one was merged from, if it was
 
     @classmethod
     def from_dict(cls, spec: Mapping[str, Any]) -> RunSpec:
@@ -70,29 +82,62 @@ class RunSpec:
                 seeds=tuple(spec["seeds"]),
                 episodes=spec["episodes"],
                 tasks=tuple(spec["tasks"]),
-                step_limits={int(n): limit for n, limit in spec["step_limits"].items()},
+                step_limits=_step_limits(spec),
                 tables=tuple(_table_entry(entry) for entry in spec["tables"]),
                 skill_labels=spec.get("skill_labels", {}),
                 own_first_skill=frozenset(
                     m["name"] for m in spec["methods"] if m.get("own_first_skill", False)
                 ),
                 block_episodes=spec.get("spec", {}).get("block_episodes", 1),
+                parts=tuple(
+                    PartEntry(
+                        part["label"],
+                        tuple(part["methods"]),
+                        tuple(part["tasks"]),
+                        _step_limits(part),
+                        part["block_episodes"],
+                    )
+                    for part in spec.get("parts", ())
+                ),
             )
         except KeyError as missing:
             raise RunError(f"spec.json has no {missing}: another version wrote it") from None
 
+    @property
+    def by_part(self) -> list[RunSpec]:
+        """The spec of each part alone; this one if it has none."""
+        return [
+            replace(
+                self,
+                methods={name: self.methods[name] for name in part.methods if name in self.methods},
+                tasks=tuple(task for task in part.tasks if task in self.tasks),
+                step_limits=part.step_limits,
+                block_episodes=part.block_episodes,
+                parts=(),
+            )
+            for part in self.parts
+        ] or [self]
+
     def skill_label(self, skill: str) -> str:
         """The name a skill goes by in tables: "bottom-burner" -> "bottom burner"."""
-        return self.skill_labels.get(skill, skill.replace("_", " ").replace("-", " "))
+        return self.skill_labels.get(skill) or plain_label(skill)
 
     def task_label(self, task: str) -> str:
         """The name a task goes by in tables: "g0>g1" -> "g0 → g1"."""
         return " → ".join(self.skill_label(skill) for skill in task.split(SEPARATOR))
 
 
+def _step_limits(plain: Mapping[str, Any]) -> dict[int, int]:
+    return {int(length): limit for length, limit in plain["step_limits"].items()}
+
+
 def _table_entry(entry: Mapping[str, Any]) -> TableEntry:
     known = TableEntry.__dataclass_fields__
     return TableEntry(**{name: value for name, value in entry.items() if name in known})
+
+
+def plain_label(skill: str) -> str:
+    return skill.replace("_", " ").replace("-", " ")
 
 
 def task_length(task: str) -> int:

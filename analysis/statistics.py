@@ -1,8 +1,8 @@
 """Means, gains and their intervals.
 
-Everything here works on how often each score was seen, (seeds, tasks, scores), because a task of
-n skills has n + 1 possible scores: drawing episodes with replacement is then one multinomial
-draw of counts, exactly and not approximately, however many episodes there are.
+Tasks below one first skill are the same episodes for as long as their skills are the same, so they
+are no more independent than one episode is of itself. Environments draw by (root seed, benchmark,
+seed, episode, prefix); what is independent below a seed is therefore (first skill, episode).
 """
 
 import hashlib
@@ -12,17 +12,18 @@ import numpy as np
 import pandas as pd
 from scipy.stats import norm
 
+from analysis.run import SEPARATOR
+
 RESAMPLES = 1000
 CONFIDENCE = 0.95
-CHUNK = 4_000_000  # numbers held at once while resampling: 32 MB
 
 
 @dataclass(frozen=True)
-class ScoreCounts:
-    """How often each score was seen; seeds and tasks without episodes have counts of zero."""
+class Scores:
+    """A score for every seed, task and episode; NaN where it was not played."""
 
-    values: np.ndarray  # (K,) the distinct scores
-    counts: np.ndarray  # (S, T, K) episodes of seed s and task t with score k
+    values: np.ndarray  # (S, T, E)
+    tasks: tuple[str, ...]  # (T,) "g0>g1"
 
 
 @dataclass(frozen=True)
@@ -44,55 +45,104 @@ def generator(*names: str) -> np.random.Generator:
     return np.random.Generator(np.random.Philox(key=int.from_bytes(digest[:16], "little")))
 
 
-def count_scores(scores: np.ndarray, seeds: np.ndarray, tasks: np.ndarray) -> ScoreCounts:
-    """Counts of one row per episode, (N,) each; the order of the rows does not matter."""
-    values, value = np.unique(scores, return_inverse=True)
-    seed_codes, seed_ids = pd.factorize(seeds, sort=True)
-    task_codes, task_ids = pd.factorize(tasks, sort=True)
-    shape = (len(seed_ids), len(task_ids), len(values))
-    cell = np.ravel_multi_index((seed_codes, task_codes, value), shape)
-    return ScoreCounts(values, np.bincount(cell, minlength=int(np.prod(shape))).reshape(shape))
+def arrange(episodes: pd.DataFrame, column: str) -> Scores:
+    """A column of a frame with seed, task and episode; the order of its rows does not matter."""
+    codes, labels = zip(
+        *(pd.factorize(episodes[name], sort=True) for name in ("seed", "task", "episode")),
+        strict=True,
+    )
+    values = np.full([len(names) for names in labels], np.nan)
+    values[codes] = episodes[column]
+    return Scores(values, tuple(labels[1]))
 
 
-def seed_means(scores: ScoreCounts) -> np.ndarray:
+def seed_means(scores: Scores) -> np.ndarray:
     """(S,) each seed's mean over its tasks of their mean scores: every task weighs the same."""
-    episodes = scores.counts.sum(axis=2)
-    task_means = (scores.counts @ scores.values) / np.where(episodes > 0, episodes, 1)
-    return task_means.sum(axis=1) / (episodes > 0).sum(axis=1)
+    means = _task_means(scores.values)
+    return np.array([seed[~np.isnan(seed)].mean() for seed in means])
+
+
+def _task_means(values: np.ndarray) -> np.ndarray:
+    """(S, T) means over the episodes that were played; NaN where there are none."""
+    played = (~np.isnan(values)).sum(axis=2)
+    return np.nansum(values, axis=2) / np.where(played > 0, played, np.nan)
 
 
 def bootstrap_means(
-    scores: ScoreCounts, rng: np.random.Generator, resamples: int = RESAMPLES
+    scores: Scores,
+    rng: np.random.Generator,
+    resamples: int = RESAMPLES,
+    *,
+    other_tasks: bool = False,
 ) -> np.ndarray:
-    """(resamples,) means under resampling of seeds, then their tasks, then their episodes.
+    """(resamples,) means under resampling of seeds, and below each of (first skill, episode).
 
-    A seed trains everything anew and serves all tasks, so it is the cluster. With one seed only
-    tasks and episodes vary, and the spread says nothing about other seeds.
+    A seed trains everything anew and serves all tasks, so it is the cluster; with one seed the
+    spread says nothing about other seeds. Episode numbers are drawn once for a seed and first
+    skill, and the draw counts for all tasks below it. Tasks are all those there are, and stay as
+    they are.
+
+    With `other_tasks` they are a sample of such tasks: families, which begin with the same two
+    skills, are drawn as well, the same for all seeds. As episodes are drawn within the families
+    drawn, what differs between families by the luck of their episodes counts twice, and the
+    spread is if anything too wide.
     """
-    n_seeds = len(scores.counts)
-    seed_draws = rng.multinomial(n_seeds, np.full(n_seeds, 1 / n_seeds), size=resamples)
+    n_seeds = len(scores.values)
+    seeds = rng.multinomial(n_seeds, np.full(n_seeds, 1 / n_seeds), size=resamples)
+    prefixes = [task.split(SEPARATOR)[:2] for task in scores.tasks]
+    family, names = pd.factorize(pd.Series(map(SEPARATOR.join, prefixes)))
+    first = pd.factorize(pd.Series([name.split(SEPARATOR)[0] for name in names]))[0]
+    weights = np.ones((resamples, len(names)))  # (B, F) how often a family was drawn
+    if other_tasks:
+        weights = _draw(np.ones(resamples, dtype=np.int64), len(names), rng)
     totals = np.zeros(resamples)
-    for seed, counts in enumerate(scores.counts):
-        played = counts[counts.sum(axis=1) > 0]  # (T, K)
-        step = max(1, CHUNK // played.size)
-        for start in range(0, resamples, step):
-            chunk = slice(start, start + step)
-            totals[chunk] += _seed_totals(played, scores.values, seed_draws[chunk, seed], rng)
+    for values, times in zip(scores.values, seeds.T, strict=True):
+        totals += _seed_totals(values, family, first, weights, times, rng)
     return totals / n_seeds
 
 
 def _seed_totals(
-    counts: np.ndarray, values: np.ndarray, seed_draws: np.ndarray, rng: np.random.Generator
+    values: np.ndarray,  # (T, E) of one seed
+    family: np.ndarray,  # (T,) of each task
+    first: np.ndarray,  # (F,) first skill of each family
+    weights: np.ndarray,  # (B, F)
+    times: np.ndarray,  # (B,) how often the seed was drawn, each time with its own episodes
+    rng: np.random.Generator,
 ) -> np.ndarray:
-    """(B,) summed means of a seed drawn `seed_draws` (B,) times, each time with its own tasks.
+    """(B,) summed means of a seed.
 
-    A task drawn m times, each time with n episodes, is m·n episodes drawn at once.
+    A task's mean moves by Σ_e weight_e · (score_e − mean) / n over its n episodes e, which is
+    linear: tasks of a family are added up before anything is drawn. With all episodes there the
+    mean over the tasks is exactly that of the drawn episodes; where some are missing, or families
+    differ in size, it is to first order, and a draw without any of a task's episodes does no harm.
     """
-    n_tasks = len(counts)
-    episodes = counts.sum(axis=1)  # (T,)
-    task_draws = rng.multinomial(seed_draws * n_tasks, np.full(n_tasks, 1 / n_tasks))  # (B, T)
-    score_draws = rng.multinomial(task_draws * episodes, counts / episodes[:, None])  # (B, T, K)
-    return ((score_draws @ values) / episodes).sum(axis=1) / n_tasks
+    played = ~np.isnan(values)
+    means = _task_means(values[None])[0]  # (T,)
+    known = ~np.isnan(means)
+    mean, n_tasks = means[known].mean(), known.sum()
+    member = family == np.arange(len(first))[:, None]  # (F, T)
+    apart = member @ np.where(known, means - mean, 0)  # (F,) of its tasks from the seed's mean
+    moved = np.where(played, values - means[:, None], 0) / np.maximum(played.sum(1), 1)[:, None]
+    by_episode = member @ moved  # (F, E)
+    totals = times * mean
+    for skill in np.unique(first):
+        below = first == skill
+        units = played[member[below].any(axis=0)].any(axis=0)  # (E,) any task below was played
+        if units.any():
+            episodes = _draw(times, int(units.sum()), rng)  # (B, units)
+            sums = times[:, None] * apart[below] + episodes @ by_episode[below][:, units].T
+            totals += (weights[:, below] * sums).sum(axis=1) / n_tasks
+    return totals
+
+
+def _draw(times: np.ndarray, units: int, rng: np.random.Generator) -> np.ndarray:
+    """(B, units) weights of units drawn with replacement, `times` (B,) over; they average it.
+
+    One fewer is drawn than there are, for more weight each (Rao and Wu, 1988): the variance of a
+    mean is then that of the usual unbiased estimate, where n of n would give (n - 1)/n of it.
+    """
+    drawn = max(units - 1, 1)
+    return rng.multinomial(times * drawn, np.full(units, 1 / units)) * (units / drawn)
 
 
 def interval(means: np.ndarray) -> tuple[float, float]:
@@ -102,18 +152,18 @@ def interval(means: np.ndarray) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def estimate(scores: ScoreCounts, rng: np.random.Generator, resamples: int = RESAMPLES) -> Estimate:
+def estimate(scores: Scores, rng: np.random.Generator, resamples: int = RESAMPLES) -> Estimate:
     """Mean, spread over seeds and interval; all NaN if there is no episode.
 
     The variance divides by the number of seeds (ddof = 0), as numpy does by default and so
     presumably the paper; over three seeds ddof = 1 would be half as large again.
     """
-    if scores.counts.size == 0:
+    if scores.values.size == 0:
         return Estimate(np.nan, np.nan, np.nan, np.nan, np.nan, episodes=0, seeds=0)
     means = seed_means(scores)
     low, high = interval(bootstrap_means(scores, rng, resamples))
     variance = float(means.var())
-    episodes = int(scores.counts.sum())
+    episodes = int((~np.isnan(scores.values)).sum())
     return Estimate(
         float(means.mean()), low, high, variance, float(np.sqrt(variance)), episodes, len(means)
     )
@@ -122,9 +172,10 @@ def estimate(scores: ScoreCounts, rng: np.random.Generator, resamples: int = RES
 def paired_differences(first: pd.DataFrame, second: pd.DataFrame) -> pd.DataFrame:
     """Episodes that both frames have, matched by seed, task and episode.
 
-    Columns seed, task, score_first, score_second, difference = first - second. Matched episodes
-    share their environment's random numbers, which the difference cancels. It is taken in whole
-    accomplished skills, so that equal differences are equal numbers.
+    Columns seed, task, episode, score_first, score_second, difference = first - second. Matched
+    episodes share their environment's random numbers, and mostly their first skills, which the
+    difference cancels. It is taken in whole accomplished skills, so that equal differences are
+    equal numbers.
     """
     key = ["seed", "task", "episode"]
     pairs = first[[*key, "length", "accomplished"]].merge(
@@ -134,7 +185,7 @@ def paired_differences(first: pd.DataFrame, second: pd.DataFrame) -> pd.DataFram
     pairs["score_first"] = pairs["accomplished_first"] / length
     pairs["score_second"] = pairs["accomplished_second"] / length
     pairs["difference"] = (pairs["accomplished_first"] - pairs["accomplished_second"]) / length
-    return pairs[["seed", "task", "score_first", "score_second", "difference"]]
+    return pairs[[*key, "score_first", "score_second", "difference"]]
 
 
 @dataclass(frozen=True)
@@ -155,17 +206,24 @@ class Gain:
         return self.difference / self.score_second if self.score_second > 0 else np.nan
 
 
-def paired_gain(first: pd.DataFrame, second: pd.DataFrame, rng: np.random.Generator) -> Gain:
-    """The first over the second, every task and every seed weighing the same."""
+def paired_gain(
+    first: pd.DataFrame,
+    second: pd.DataFrame,
+    rng: np.random.Generator,
+    *,
+    other_tasks: bool = False,
+) -> Gain:
+    """The first over the second, every task and every seed weighing the same.
+
+    `other_tasks`: whether the interval is to be about other tasks, too (see `bootstrap_means`).
+    """
     pairs = paired_differences(first, second)
     if pairs.empty:
         return Gain(np.nan, np.nan, np.nan, np.nan, np.nan, pairs=0, seeds=0)
-    seeds, tasks = pairs["seed"].to_numpy(), pairs["task"].to_numpy()
     differences, firsts, seconds = (
-        count_scores(pairs[name].to_numpy(), seeds, tasks)
-        for name in ("difference", "score_first", "score_second")
+        arrange(pairs, name) for name in ("difference", "score_first", "score_second")
     )
-    low, high = interval(bootstrap_means(differences, rng))
+    low, high = interval(bootstrap_means(differences, rng, other_tasks=other_tasks))
     return Gain(
         float(seed_means(differences).mean()),
         low,
@@ -173,7 +231,7 @@ def paired_gain(first: pd.DataFrame, second: pd.DataFrame, rng: np.random.Genera
         float(seed_means(firsts).mean()),
         float(seed_means(seconds).mean()),
         len(pairs),
-        len(differences.counts),
+        len(differences.values),
     )
 
 

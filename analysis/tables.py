@@ -9,7 +9,7 @@ import pandas as pd
 from analysis.paper import paper_scores
 from analysis.rows import column_labels, place_tasks
 from analysis.run import RunSpec, TableEntry
-from analysis.statistics import count_scores, estimate, generator, paired_gain
+from analysis.statistics import arrange, estimate, generator, paired_gain
 
 SCORE_COLUMNS = [
     "row", "method", "score", "variance", "std", "ci_low", "ci_high", "episodes", "seeds",
@@ -46,6 +46,12 @@ class Table:
         played = self.scores.set_index(["row", "method"])["episodes"]
         short = {cell: asked - int(played[cell]) for cell, asked in self.expected.items()}
         return {cell: episodes for cell, episodes in short.items() if episodes > 0}
+
+    @property
+    def fewest_seeds(self) -> int:
+        """Of all cells that have an episode: what the weakest interval rests on."""
+        seeds = self.scores["seeds"]
+        return int(seeds[seeds > 0].min()) if (seeds > 0).any() else len(self.spec.seeds)
 
 
 def build_table(episodes: pd.DataFrame, spec: RunSpec, entry: TableEntry) -> Table:
@@ -90,10 +96,7 @@ def score_table(cells: Cells, entry: TableEntry) -> pd.DataFrame:
     paper = paper_scores(entry.paper)
     records = []
     for (row, method), played in cells.items():
-        counts = count_scores(
-            played["score"].to_numpy(), played["seed"].to_numpy(), played["task"].to_numpy()
-        )
-        ours = estimate(counts, generator("score", entry.id, row, method))
+        ours = estimate(arrange(played, "score"), generator("score", entry.id, row, method))
         records.append(
             (row, method, ours.mean, ours.variance, ours.std, ours.low, ours.high,
              ours.episodes, ours.seeds, *paper.get((row, method), (np.nan, np.nan)))

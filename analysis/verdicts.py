@@ -28,6 +28,11 @@ EXPLANATION = (
     f"accomplished skills is judged without an interval: it “{HOLDS}” if our numbers lie within "
     f"{SAME_SKILLS} of each other at all lengths, and else “{FAILS}”."
 )
+ONE_SEED = "for these models"
+ONE_SEED_EXPLANATION = (
+    f"A verdict from one seed is “{ONE_SEED}” only, cells' verdicts included: whether it is so "
+    "for others, trained in the same way, takes more seeds."
+)
 
 
 @dataclass(frozen=True)
@@ -37,6 +42,18 @@ class Claim:
     text: str
     verdict: str  # HOLDS, UNDECIDED, FAILS or NO_DATA
     detail: str
+    seeds: int = 0
+
+    @property
+    def judgement(self) -> str:
+        """The verdict as it may be said: of one seed's models where there are no others."""
+        of_models = self.seeds == 1 and self.verdict in (HOLDS, FAILS)
+        return f"{self.verdict} {ONE_SEED}" if of_models else self.verdict
+
+
+def explanation(table: Table) -> str:
+    """How the table's verdicts are to be read."""
+    return " ".join([EXPLANATION, *([ONE_SEED_EXPLANATION] if table.fewest_seeds == 1 else [])])
 
 
 def cell_verdict(score: float, low: float, high: float, paper_score: float) -> str:
@@ -76,7 +93,8 @@ def _leads(table: Table) -> list[Claim]:
                 f"{rival}, the best other method here "
                 f"({_seeds(lead['seeds'])}, {lead['pairs']:,} paired episodes)"
             )
-        found.append(Claim(f"{leader} leads “{lead['row']}”", verdict, detail))
+        text = f"{leader} leads “{lead['row']}”"
+        found.append(Claim(text, verdict, detail, lead["seeds"]))
     return found
 
 
@@ -102,8 +120,8 @@ def _constant_skills(table: Table) -> list[Claim]:
     rounding = 2 * HALF_DIGIT * max(int(row.split()[0]) for row in printed.index)
     if np.ptp(printed) > rounding:
         return []
-    cells = table.scores.query("method == @method").set_index("row")["score"]
-    ours = cells * [int(row.split()[0]) for row in cells.index]
+    cells = table.scores.query("method == @method").set_index("row")
+    ours = cells["score"] * [int(row.split()[0]) for row in cells.index]
     text = f"{table.labels[method]} accomplishes the same number of skills at every length"
     if ours.isna().any() or len(ours) < 2:
         return [Claim(text, NO_DATA, "needs at least two lengths")]
@@ -115,6 +133,7 @@ def _constant_skills(table: Table) -> list[Claim]:
             HOLDS if constant else FAILS,
             f"{detail}; spread {np.ptp(ours):.3f}, at most {SAME_SKILLS} counts as constant "
             f"(paper: {printed.min():.3f} to {printed.max():.3f})",
+            int(cells["seeds"].min()),
         )
     ]
 

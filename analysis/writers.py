@@ -8,20 +8,24 @@ import pandas as pd
 
 from analysis.tables import Table
 from analysis.verdicts import (
-    EXPLANATION,
     NO_DATA,
     NOT_PRINTED,
     cell_verdicts,
     claims,
     error_reading,
+    explanation,
 )
 
 Record = Mapping[Hashable, Any]
 """One line of a score or gain table, by column."""
 
+BOOTSTRAP = (
+    "a bootstrap over seeds, and within a seed over each first skill's episodes, drawn together "
+    "for all tasks that begin with it (tasks are fixed)"
+)
 INTERVALS = (
-    "Scores are means ± variance over seeds (ddof = 0) with 95 % intervals from a hierarchical "
-    "bootstrap over seeds, tasks and episodes."
+    "Scores are means over all tasks of a cell ± variance over seeds (ddof = 0) with 95 % "
+    f"intervals from {BOOTSTRAP}."
 )
 
 
@@ -37,8 +41,10 @@ def describe(table: Table) -> list[str]:
     lines = [
         f"Scale: {spec.scale}. {seeds} ({', '.join(map(str, spec.seeds))}), "
         f"{spec.episodes} episodes per task, method and seed.",
-        f"{INTERVALS} {seed_note(len(spec.seeds))}",
+        f"{INTERVALS} {seed_note(table.fewest_seeds)}",
     ]
+    if table.fewest_seeds < len(spec.seeds):
+        lines[-1] += f" That is so for some cells here: not all have {seeds}."
     if table.missing:
         asked, missing = sum(table.expected.values()), sum(table.missing.values())
         lines.insert(
@@ -51,12 +57,24 @@ def describe(table: Table) -> list[str]:
 
 
 def seed_note(seeds: int) -> str:
-    """What the number of seeds allows an interval to say."""
+    """What the number of seeds allows an interval to say.
+
+    A percentile interval of up to four seeds can hardly leave the range of their means. That range
+    leaves out the median of what they are drawn from only if all lie on one side of it.
+    """
     if seeds == 1:
-        return "With one seed they cover tasks and episodes only, and say nothing about retraining."
+        return (
+            "With one seed the intervals cover other episodes of these trained models, and not "
+            "other training runs: those may differ by far more."
+        )
+    if seeds < 5:
+        return (
+            f"With only {seeds} seeds the intervals are rough: the more training runs differ, the "
+            f"nearer to {100 * (1 - 2 ** (1 - seeds)):.0f} % is what they really cover."
+        )
     if seeds < 10:
-        return f"With only {seeds} seeds they are rough, and if anything too narrow."
-    return f"They rest on {seeds} seeds."
+        return f"With only {seeds} seeds the intervals are rough, and if anything too narrow."
+    return f"The intervals rest on {seeds} seeds."
 
 
 def cell_text(cell: Record) -> str:
@@ -86,13 +104,13 @@ def short_of(table: Table, row: str, method: str) -> str:
 def to_markdown(table: Table) -> str:
     """Scores, gains, claims, and how to read them."""
     head = [f"# {table.entry.title}", "", *(f"{line}\n" for line in describe(table))]
-    body = [_markdown_scores(table), "", EXPLANATION, "", error_reading(table.scores)]
+    body = [_markdown_scores(table), "", explanation(table), "", error_reading(table.scores)]
     if not table.gains.empty:
         body += ["", "## Paired gains", "", _markdown_gains(table)]
     found = claims(table)
     if found:
         body += ["", "## The paper's claims", ""]
-        body += [f"- {claim.text}: **{claim.verdict}**. {claim.detail}." for claim in found]
+        body += [f"- {claim.text}: **{claim.judgement}**. {claim.detail}." for claim in found]
     return "\n".join([*head, *body]).rstrip() + "\n"
 
 

@@ -14,7 +14,8 @@ from rich.console import Console
 
 from orchestrator.errors import IncompleteError, SkillstitchError, UsageError
 from orchestrator.executors import ExecutorKind
-from orchestrator.spec import Spec, load_spec, packaged_specs
+from orchestrator.spec import Spec, packaged_specs
+from orchestrator.suite import Suite, is_suite, load_asked, part_directories, with_specs
 
 INTERRUPTED = 130
 ERRORS = Console(stderr=True, highlight=False, soft_wrap=True)
@@ -87,8 +88,11 @@ def _usage() -> str:
     )
 
 
-def _with_spec(command: type[Any], name: str, words: list[str]) -> Any:
-    """Parse `SPEC [options]`; every field of the spec is an option, its default the spec's own."""
+def _with_spec(command: type[Any], name: str, words: list[str]) -> tuple[Any, Spec | Suite]:
+    """Parse `SPEC [options]`; every field of the spec is an option, its default the spec's own.
+
+    The fields of a suite's parts differ: the same words are read for each of them.
+    """
     program = f"skillstitch {name} SPEC"
     if not words or words[0].startswith("-"):
         if words and words[0] in ("-h", "--help"):
@@ -96,13 +100,23 @@ def _with_spec(command: type[Any], name: str, words: list[str]) -> Any:
         else:
             raise UsageError(f"skillstitch {name} needs a spec: {', '.join(packaged_specs())}")
     scale: Any = _option(words, "--scale") or "paper"
-    spec = load_spec(words[0], scale)
+    asked = load_asked(words[0], scale)
+    specs = [part.spec for part in asked.parts] if isinstance(asked, Suite) else [asked]
     if sweep := _option(words, "--from-sweep"):
         from sweeps.winner import with_winner
 
-        spec = with_winner(spec, sweep)
-    default = command(spec)
-    return tyro.cli(command, default=default, args=words[1:], prog=program)
+        specs = [with_winner(spec, sweep) for spec in specs]
+    commands = []
+    for spec in specs:
+        try:
+            commands.append(tyro.cli(command, default=command(spec), args=words[1:], prog=program))
+        except SystemExit as end:
+            if end.code and len(specs) > 1:
+                raise UsageError(f"options apply to every part; so read for {spec.name}") from None
+            raise
+    if isinstance(asked, Suite):
+        return commands[0], with_specs(asked, [each.spec for each in commands])
+    return commands[0], commands[0].spec
 
 
 def _option(words: list[str], name: str) -> str:
@@ -120,13 +134,17 @@ def _plan(words: list[str]) -> None:
     from orchestrator.costs import estimate
     from orchestrator.ledger import Ledger
     from orchestrator.plan import make_plan
-    from orchestrator.printing import plan_lines
+    from orchestrator.printing import plan_lines, suite_plan_lines
     from orchestrator.store import Store
 
-    command = _with_spec(PlanCommand, "plan", words)
-    plan = make_plan(command.spec)
-    costs = estimate(plan, Store(command.store), Ledger.look(command.store / "blocks.sqlite"))
-    for line in plan_lines(command.spec, costs, command.workers):
+    command, asked = _with_spec(PlanCommand, "plan", words)
+    if isinstance(asked, Suite):
+        lines = suite_plan_lines(asked, command.store, command.workers)
+    else:
+        look = Ledger.look(command.store / "blocks.sqlite")
+        costs = estimate(make_plan(asked), Store(command.store), look)
+        lines = plan_lines(asked, costs, command.workers)
+    for line in lines:
         OUTPUT.print(line, markup=False)
 
 
@@ -134,10 +152,11 @@ def _run(words: list[str]) -> None:
     from orchestrator.printing import summary_lines
     from orchestrator.progress import ConsoleProgress
     from orchestrator.reproduce import Settings, reproduce
+    from orchestrator.reproduce_suite import reproduce_suite
     from orchestrator.rundir import RunDirectory, default_out
 
-    command: RunCommand = _with_spec(RunCommand, "run", words)
-    out = command.out or default_out(command.spec)
+    command, asked = _with_spec(RunCommand, "run", words)
+    out = command.out or default_out(asked)
     settings = Settings(
         out,
         command.store,
@@ -149,7 +168,10 @@ def _run(words: list[str]) -> None:
     incomplete = None
     with ConsoleProgress(ERRORS) as progress:
         try:
-            reproduce(command.spec, settings, progress)
+            if isinstance(asked, Suite):
+                reproduce_suite(asked, settings, progress)
+            else:
+                reproduce(asked, settings, progress)
         except IncompleteError as error:
             if not (out / "finished").is_file():
                 raise
@@ -190,7 +212,7 @@ def _clear_errors() -> Iterator[None]:
 
 
 def _status(words: list[str]) -> None:
-    from orchestrator.printing import status_lines
+    from orchestrator.printing import status_lines, suite_status_lines
     from orchestrator.reproduce import catch_up
     from orchestrator.rundir import RunDirectory
 
@@ -201,16 +223,20 @@ def _status(words: list[str]) -> None:
             run: the run directory.
             store: where its artifacts are kept.
         """
-        for line in status_lines(RunDirectory(run), store):
+        directory = RunDirectory(run)
+        lines = suite_status_lines if is_suite(directory) else status_lines
+        for line in lines(directory, store):
             OUTPUT.print(line, markup=False)
-        if trouble := catch_up(RunDirectory(run)):
-            ERRORS.print(f"tracking: {trouble}", markup=False)
+        for each in (*part_directories(directory).values(), directory):
+            if trouble := catch_up(each):
+                ERRORS.print(f"tracking: {trouble}", markup=False)
 
     tyro.cli(status, args=words, prog="skillstitch status")
 
 
 def _report(words: list[str]) -> None:
     from analysis.report import build_report
+    from orchestrator.merge import merge_again
     from orchestrator.reproduce import catch_up
     from orchestrator.rundir import RunDirectory
 
@@ -222,12 +248,16 @@ def _report(words: list[str]) -> None:
             results: also export each table to RESULTS/<table>/.
         """
         directory = RunDirectory(run)
-        directory.spec()  # a clear error where there is no run
+        suite = is_suite(directory)  # a clear error where there is no run
         with directory.locked(), _clear_errors():
-            page = build_report(run)
-        OUTPUT.print(f"wrote {page}", markup=False)
-        if results is not None:
+            if suite:
+                merge_again(directory)
+            page = run / "report" / "index.html"
+            if results is None:
+                build_report(run)
+        if results is not None:  # builds it, too
             _export(run, results)
+        OUTPUT.print(f"wrote {page}", markup=False)
         if trouble := catch_up(RunDirectory(run)):
             ERRORS.print(f"tracking: {trouble}", markup=False)
 

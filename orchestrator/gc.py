@@ -11,7 +11,9 @@ from orchestrator.errors import UsageError
 from orchestrator.ledger import Ledger
 from orchestrator.plan import make_plan
 from orchestrator.rundir import RunDirectory
+from orchestrator.spec import Spec
 from orchestrator.store import Store
+from orchestrator.suite import is_suite, part_directory, suite_of
 
 SECONDS_TO_WRITE = 3600
 
@@ -24,14 +26,8 @@ def collect_garbage(store_root: Path, runs: Sequence[Path], *, delete: bool) -> 
     if not runs:
         raise UsageError("name the run directories to keep, for example runs/table1-paper")
     needed: set[str] = set()
-    for run in runs:
-        directory = RunDirectory(run)
-        plan = make_plan(directory.spec())
-        needed |= set(plan.recipes) | {task.key for task in plan.tasks.values()}
-        # The run may have been made by other code, under which the same things had other names.
-        ledger = directory.ledger(read_only=True)
-        needed |= ledger.artifacts() | ledger.finished()
-        ledger.close()
+    for run in map(RunDirectory, runs):
+        needed |= _of_suite(run) if is_suite(run) else _of_run(run)
     store = Store(store_root)
     verb = "deleted" if delete else "would delete"
     freed = 0
@@ -59,6 +55,30 @@ def collect_garbage(store_root: Path, runs: Sequence[Path], *, delete: bool) -> 
     yield f"{verb} {len(stale)} blocks; artifacts freed {freed / 1e6:.1f} MB"
     if not delete:
         yield "nothing was touched; add --delete to do it"
+
+
+def _of_run(directory: RunDirectory) -> set[str]:
+    needed = _planned(directory.spec())
+    # The run may have been made by other code, under which the same things had other names.
+    ledger = directory.ledger(read_only=True)
+    needed |= ledger.artifacts() | ledger.finished()
+    ledger.close()
+    return needed
+
+
+def _of_suite(directory: RunDirectory) -> set[str]:
+    """All that its parts need, those included that have not begun."""
+    needed: set[str] = set()
+    for part in suite_of(directory).parts:
+        run = part_directory(directory, part.label)
+        begun = (run.path / "ledger.sqlite").is_file()
+        needed |= _of_run(run) if begun else _planned(part.spec)
+    return needed
+
+
+def _planned(spec: Spec) -> set[str]:
+    plan = make_plan(spec)
+    return set(plan.recipes) | {task.key for task in plan.tasks.values()}
 
 
 def _size(folder: Path) -> int:

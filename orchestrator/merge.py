@@ -9,13 +9,13 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.run import SEPARATOR, VARIANT
+from analysis.run import SEPARATOR, VARIANT, plain_label
 from orchestrator.errors import UsageError
 from orchestrator.kits import KITS
 from orchestrator.methods import method_label
 from orchestrator.rundir import RunDirectory
 from orchestrator.structure import Plain, to_plain
-from orchestrator.suite import Part, Suite, part_directory
+from orchestrator.suite import Part, Suite, part_directory, suite_of
 
 SUMMED = ("counts", "seconds", "busy worker seconds")  # of the parts' provenance
 KEPT = ("run_id", "written", "git_revision", "cpu", "executor", "workers", *SUMMED)
@@ -108,7 +108,7 @@ def _describe_part(suite: Suite, part: Part) -> Plain:
         "skill_labels": [
             (naming.skill(skill), suite.skill_label(skill))
             for skill in skills
-            if suite.skill_label(skill) != naming.skill(skill)
+            if suite.skill_label(skill) != plain_label(naming.skill(skill))
         ],
     }
 
@@ -157,6 +157,12 @@ def write_merged(suite: Suite, directory: RunDirectory, run_id: str) -> None:
     directory.write_json("provenance.json", _provenance(made) | {"run_id": run_id})
 
 
+def merge_again(directory: RunDirectory) -> None:
+    """Write a suite's files from what its parts have now. UsageError where nothing was played."""
+    identity = directory.read_json("identity.json")
+    write_merged(suite_of(directory), directory, identity["run_id"])
+
+
 def _segments(part: RunDirectory, naming: Naming) -> pd.DataFrame:
     frame = pd.read_parquet(part.path / "segments.parquet")
     frame["prefix"] = frame["prefix"].map({p: naming.prefix(p) for p in frame["prefix"].unique()})
@@ -185,7 +191,7 @@ def _dataset(dataset: Plain, naming: Naming) -> Iterator[Plain]:
 
 
 def _provenance(made: dict[str, Plain]) -> Plain:
-    """Of the part written last, with all parts' numbers summed, and what each part was made with."""
+    """Of the part written last, all parts' numbers summed, and what each part was made with."""
     last = max(made.values(), key=lambda of_part: of_part["written"])
     whole = {name: value for name, value in last.items() if name not in ("executor", "workers")}
     for name in SUMMED:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
-from orchestrator.costs import Estimate
+from orchestrator.costs import Estimate, estimate
+from orchestrator.ledger import Ledger
 from orchestrator.methods import method_label
 from orchestrator.plan import make_plan
 from orchestrator.rundir import RunDirectory
 from orchestrator.spec import Spec
 from orchestrator.store import Store
+from orchestrator.suite import Suite, part_directories
 
 
 def plan_lines(spec: Spec, costs: Estimate, workers: int | None) -> Iterator[str]:
@@ -39,16 +42,50 @@ def plan_lines(spec: Spec, costs: Estimate, workers: int | None) -> Iterator[str
         f"environment steps: {costs.steps_in_tree:,} in the tree, {costs.steps_naive:,} without, "
         "at most"
     )
-    workers = workers or os.cpu_count() or 1
-    source = "measured in this store" if costs.from_history else "from a reference machine"
-    total = (costs.seconds_training + costs.seconds_evaluation) / workers
     yield f"to be played: about {costs.segments_missing:,} segments"
-    yield (
-        f"time: {_duration(costs.seconds_training)} training and "
-        f"{_duration(costs.seconds_evaluation)} evaluation on one core, together about "
-        f"{_duration(total)} on {workers} ({source})"
+    yield _time_line([costs], workers)
+    yield _disk_line([costs])
+
+
+def _time_line(costs: list[Estimate], workers: int | None) -> str:
+    workers = workers or os.cpu_count() or 1
+    measured = all(each.from_history for each in costs)
+    source = "measured in this store" if measured else "from a reference machine"
+    training = sum(each.seconds_training for each in costs)
+    evaluation = sum(each.seconds_evaluation for each in costs)
+    return (
+        f"time: {_duration(training)} training and {_duration(evaluation)} evaluation on one core, "
+        f"together about {_duration((training + evaluation) / workers)} on {workers} ({source})"
     )
-    yield f"disk: about {max(1, costs.disk_bytes // 10**6)} MB more"
+
+
+def _disk_line(costs: list[Estimate]) -> str:
+    return f"disk: about {max(1, sum(each.disk_bytes for each in costs) // 10**6)} MB more"
+
+
+def suite_plan_lines(suite: Suite, store_root: Path, workers: int | None) -> Iterator[str]:
+    """Each part's plan and cost, then those of all; what parts share counts once."""
+    store, shared = Store(store_root), Ledger.look(store_root / "blocks.sqlite")
+    counted: set[str] = set()
+    costs = []
+    yield f"{suite.name} at {suite.scale} scale: {suite.title}"
+    for part in suite.parts:
+        plan = make_plan(part.spec)
+        new = {key: recipe for key, recipe in plan.recipes.items() if key not in counted}
+        again = len(plan.recipes) - len(new)
+        counted |= set(new)
+        costs.append(estimate(replace(plan, recipes=new), store, shared))
+        yield ""
+        yield f"part {part.label}" + (f", with {again} artifacts of parts above" if again else "")
+        yield from plan_lines(part.spec, costs[-1], workers)
+    yield ""
+    yield (
+        f"all {len(costs)} parts: {sum(each.episodes for each in costs):,} episodes, "
+        f"{sum(each.steps_in_tree for each in costs):,} environment steps at most"
+    )
+    yield f"to be played: about {sum(each.segments_missing for each in costs):,} segments"
+    yield _time_line(costs, workers)
+    yield _disk_line(costs)
 
 
 def status_lines(directory: RunDirectory, store_root: Path) -> Iterator[str]:
@@ -67,15 +104,31 @@ def status_lines(directory: RunDirectory, store_root: Path) -> Iterator[str]:
         yield f"  failures   {len(failures)} blocks failed at least once"
     for entry in directory.read_json("quarantine.json") or []:
         yield f"  given up   seed {entry['seed']}, {entry['method']}, {entry['prefix']}"
+    yield _report_line(directory)
+
+
+def _report_line(directory: RunDirectory) -> str:
     report = directory.path / "report" / "index.html"
-    yield f"  report     {report if report.is_file() else 'not written yet'}"
+    return f"  report     {report if report.is_file() else 'not written yet'}"
+
+
+def suite_status_lines(directory: RunDirectory, store_root: Path) -> Iterator[str]:
+    """How far a suite and each of its parts is."""
+    asked = directory.asked()
+    yield f"{directory.path}: {asked['name']} at {asked['scale']} scale"
+    for label, part in part_directories(directory).items():
+        if (part.path / "ledger.sqlite").is_file():
+            yield f"  part       {label}"
+            yield from (f"    {line}" for line in status_lines(part, store_root))
+        else:
+            yield f"  part       {label}: not begun"
+    yield _report_line(directory)
 
 
 def summary_lines(directory: RunDirectory) -> Iterator[str]:
     """A finished run: its tables, where its time went, where to look."""
-    spec = directory.spec()
-    for table in spec.tables:
-        yield (directory.path / "report" / f"{table.id}.md").read_text().strip()
+    for table in directory.asked()["tables"]:
+        yield (directory.path / "report" / f"{table['id']}.md").read_text().strip()
         yield ""
     seconds = directory.read_json("seconds.json") or {}
     phases = sorted(seconds.items(), key=lambda phase: -phase[1])

@@ -37,7 +37,9 @@ def reproduce_suite(suite: Suite, settings: Settings, progress: Progress) -> Run
         try:
             partial = _carry_out_parts(suite, settings, parts, progress, watch)
             if not done:
-                merge(suite, directory, run_id)
+                with storage_errors(directory.path):
+                    write_merged(suite, directory, run_id)
+                    build_report(directory.path)
                 directory.mark(finished=True)
                 watch.lap("report of all parts")
         except SkillstitchError:
@@ -55,13 +57,6 @@ def reproduce_suite(suite: Suite, settings: Settings, progress: Progress) -> Run
                 "same command tries again"
             )
     return directory
-
-
-def merge(suite: Suite, directory: RunDirectory, run_id: str) -> None:
-    """Write the suite's files and report from whatever its parts have."""
-    with storage_errors(directory.path):
-        write_merged(suite, directory, run_id)
-        build_report(directory.path)
 
 
 def _carry_out_parts(

@@ -11,7 +11,7 @@ import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import analysis
 from orchestrator.errors import ChangedError, LockedError, UsageError
@@ -174,5 +174,15 @@ def _title(spec: Spec, table: TableSpec) -> Plain:
     return {"title": f"{table.title or spec.title} ({label})"} if label else {}
 
 
-def default_out(spec: Spec) -> Path:
-    return Path("runs") / f"{spec.name}-{spec.scale}"
+class Named(Protocol):
+    """A spec or a suite."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def scale(self) -> str: ...
+
+
+def default_out(asked: Named) -> Path:
+    return Path("runs") / f"{asked.name}-{asked.scale}"

@@ -272,7 +272,9 @@ def at_scale(content: Plain, scale: Scale, where: str) -> Plain:
 def spec_from_plain(content: Plain, where: str) -> Spec:
     """A spec from parsed TOML or from a run directory's spec.json."""
     if "parts" in content:
-        raise UsageError(f"{where}: a suite of several runs; here goes one, such as one of its parts")
+        raise UsageError(
+            f"{where}: a suite of several runs; here goes one, such as one of its parts"
+        )
     benchmark = content.get("benchmark")
     if not isinstance(benchmark, str) or benchmark not in BENCHMARKS:
         raise UsageError(

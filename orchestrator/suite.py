@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from analysis.rows import ROW_RULES
+from analysis.run import plain_label
 from orchestrator.errors import UsageError
 from orchestrator.rundir import RunDirectory
 from orchestrator.spec import (
@@ -18,6 +19,7 @@ from orchestrator.spec import (
     TableSpec,
     at_scale,
     differences,
+    packaged_specs,
     plain_differences,
     read_toml,
     spec_from_plain,
@@ -73,7 +75,7 @@ class Suite:
         return not self.by_variant and any(parts > 1 for parts in played.values())
 
     def skill_label(self, skill: str) -> str:
-        return self.skill_labels.get(skill, skill)
+        return self.skill_labels.get(skill) or plain_label(skill)
 
 
 def check_suite(suite: Suite) -> None:
@@ -167,11 +169,9 @@ def _part_spec(entry: PartFields, content: Plain, scale: Scale, folder: Path, wh
 
 
 def _beside(base: str, folder: Path) -> str:
-    """A file beside the suite's, with or without its ending, or else what it says."""
-    for file in (folder / base, folder / f"{base}.toml"):
-        if file.is_file():
-            return str(file)
-    return base
+    """A packaged spec's name, or a file beside the suite's, with or without its ending."""
+    files = [folder / base, folder / f"{base}.toml"] if base not in packaged_specs() else []
+    return next((str(file) for file in files if file.is_file()), base)
 
 
 def with_specs(suite: Suite, specs: list[Spec]) -> Suite:
@@ -217,5 +217,5 @@ def suite_differences(old: Suite, new: Suite) -> list[str]:
     lines = [
         f"part {label}, {line}" for label in now for line in differences(before[label], now[label])
     ]
-    whole = ({**to_plain(suite), "parts": None} for suite in (old, new))
-    return plain_differences(*whole) + lines
+    was, is_now = ({**to_plain(suite), "parts": None} for suite in (old, new))
+    return plain_differences(was, is_now) + lines

@@ -1,4 +1,12 @@
-"""What a candidate's episodes come to: its gain over No-Stitch, its score, and its planning."""
+"""What a candidate's episodes come to: its gain over No-Stitch, its score, and its planning.
+
+A table's tasks are all that it is about. A sweep's are some of many: drawn for the search, or held
+out so that a winner can be judged where it was not chosen. What is asked is whether a setting would
+gain on such tasks, so intervals here resample tasks, too, in the families (the same first two
+skills) in which `sweeps.spec.split_tasks` draws them, beside seeds and each first skill's episodes.
+They are therefore wider than those of a table of the same episodes, and with a handful of families
+rough. Of tasks that were picked by hand they say what they would if these had been drawn.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +37,7 @@ class Showing:
 
     def gain_over(self, other: pd.DataFrame, *names: str) -> Gain:
         """Paired by seed, task and episode; the interval's draws belong to these names."""
-        return paired_gain(self.episodes, other, generator("sweep", *names))
+        return paired_gain(self.episodes, other, generator("sweep", *names), other_tasks=True)
 
     def result(self, *names: str) -> Plain:
         """The metrics of a trial (see `sweeps.spec.MAXIMISED`)."""

@@ -16,6 +16,7 @@ from analysis.figures.style import house_style, save
 from analysis.pairs import shown_orders, shown_pairs
 from analysis.run import Run
 from analysis.tables import Table
+from analysis.writers import seed_note
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,8 @@ def draw_figures(run: Run, tables: list[Table], folder: Path) -> list[Drawn]:
             save(draw_scores(table), folder, name)
             caption = (
                 f"{table.entry.title}: our scores (filled, with 95 % intervals) and the paper's "
-                f"(hollow). Scale {run.spec.scale}, {len(run.spec.seeds)} seed(s)."
+                f"(hollow). Scale {run.spec.scale}, {len(run.spec.seeds)} seed(s). "
+                f"{seed_note(table.fewest_seeds)}"
             )
             drawn.append(Drawn(name, caption, table.entry.id))
         if run.showcase:
@@ -92,22 +94,26 @@ def _maze_showcase(run: Run, folder: Path) -> list[Drawn]:
     return [Drawn("showcase", SHOWCASE_CAPTION, "")]
 
 
-def _kitchen_showcase(run: Run, folder: Path) -> list[Drawn]:
+def _values_showcase(run: Run, folder: Path) -> list[Drawn]:
     save(draw_values(run.showcase, run.spec), folder, "stitch-values")
-    values = Drawn("stitch-values", f"{VALUES_CAPTION} {_which_episode(run)}", "")
+    return [Drawn("stitch-values", f"{VALUES_CAPTION} {_which_episode(run)}", "")]
+
+
+def _kitchen_showcase(run: Run, folder: Path) -> list[Drawn]:
+    drawn = _values_showcase(run, folder)
     episode = run.showcase["episodes"][-1]
     steps = sheet_steps(episode)
     try:
         frames = render_frames(np.array(episode["positions"])[steps])
     except NoPictureError as error:
-        return [values, Drawn("contact-sheet", "", "", f"no contact sheet: {error}")]
+        return [*drawn, Drawn("contact-sheet", "", "", f"no contact sheet: {error}")]
     save(draw_sheet(episode, steps, frames, run.spec), folder, "contact-sheet", image_dpi=144)
     method = run.spec.methods.get(episode["method"], episode["method"])
-    return [values, Drawn("contact-sheet", SHEET_CAPTION.format(method=method), "")]
+    return [*drawn, Drawn("contact-sheet", SHEET_CAPTION.format(method=method), "")]
 
 
 def _which_episode(run: Run) -> str:
-    """How the shown episode was chosen, as `stitching.showcase.kitchen` does."""
+    """How the shown episode was chosen, as `stitching.showcase.physics` does."""
     showcase = run.showcase
     names = [episode["method"] for episode in showcase["episodes"]]
     first, last = (run.spec.methods.get(name, name) for name in (names[0], names[-1]))
@@ -119,7 +125,12 @@ def _which_episode(run: Run) -> str:
     return f"{played}: {last} accomplishes more than {first} in {better}; the first of them."
 
 
-SHOWCASES = {"maze": _maze_showcase, "kitchen": _kitchen_showcase}
+SHOWCASES = {
+    "maze": _maze_showcase,
+    "kitchen": _kitchen_showcase,
+    "robosuite-door": _values_showcase,
+    "robosuite-can": _values_showcase,
+}
 
 
 def _diagnosis(run: Run, folder: Path) -> list[Drawn]:
@@ -134,7 +145,12 @@ def _diagnosis(run: Run, folder: Path) -> list[Drawn]:
 
 
 def _first_and_last_method(run: Run) -> tuple[str, str] | None:
-    """The two methods worth a matrix each: both played enough ordered pairs of skills."""
+    """The two methods worth a matrix each: both played enough ordered pairs of skills.
+
+    Where runs were merged, each of them shows its own.
+    """
+    if run.spec.parts:
+        return None
     seconds = run.segments[run.segments["depth"] == 2]
     pairs = seconds.groupby("method")["prefix"].nunique()
     enough = 2 * len(run.spec.skills)

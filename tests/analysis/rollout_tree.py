@@ -24,10 +24,8 @@ class Tree:
     ease: tuple[np.ndarray, ...]  # depth → (nodes,), on the scale of a normal distribution
 
     @classmethod
-    def grow(
-        cls, rng: np.random.Generator, skills: int, length: int, seed_effect: float = 0.0
-    ) -> "Tree":
-        """A tree, or with a seed effect one of many: see `Tree.retrained`."""
+    def grow(cls, rng: np.random.Generator, skills: int, length: int) -> "Tree":
+        """One of many possible trees, over all ordered tasks of this length."""
         nodes = np.cumprod(np.arange(skills, skills - length, -1))
         return cls(skills, tuple(rng.normal(0.3, 1.5, size) for size in nodes))
 

@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from analysis.compare import COLUMNS, NothingToCompareError, compare, comparison_markdown
+from analysis.writers import seed_note
 
 
 @pytest.fixture
@@ -45,6 +46,7 @@ def test_only_common_episodes_count(
     comparison = compare(run_a, run_b)
     assert comparison["pairs"].tolist() == [12 * 2 * 5] * 4 + [24 * 2 * 5] * 8
     assert set(comparison["seeds"]) == {2}
+    assert seed_note(2) in comparison_markdown(comparison, "a", "b")
 
 
 @pytest.mark.parametrize(

@@ -17,11 +17,13 @@ from analysis.verdicts import (
     LOWER,
     NO_DATA,
     NOT_PRINTED,
+    ONE_SEED_EXPLANATION,
     SAME_SKILLS,
     UNDECIDED,
     cell_verdict,
     claims,
     error_reading,
+    explanation,
 )
 
 
@@ -61,6 +63,21 @@ def test_a_lead_is_judged_by_its_interval(
 ) -> None:
     leads = table.leads[:1].assign(ci_low=low, ci_high=high)
     assert claims(replace(table, leads=leads))[0].verdict == verdict
+
+
+def test_a_verdict_from_one_seed_is_of_its_models_alone(segments: Any, spec: RunSpec) -> None:
+    alone = replace(spec, seeds=(0,))
+    one = build_table(episodes_from_segments(segments, alone), alone, alone.tables[0])
+    found = claims(one)
+    assert [claim.judgement for claim in found] == ["holds for these models"] * 4
+    undecided = one.leads.assign(ci_low=-0.1, ci_high=0.1)
+    assert claims(replace(one, leads=undecided))[0].judgement == UNDECIDED
+    assert explanation(one) == f"{EXPLANATION} {ONE_SEED_EXPLANATION}"
+
+
+def test_a_verdict_from_several_seeds_is_said_as_it_is(table: Table) -> None:
+    assert [claim.judgement for claim in claims(table)] == [HOLDS] * 4
+    assert explanation(table) == EXPLANATION
 
 
 def test_constant_skills_fail_when_they_grow(table: Table) -> None:

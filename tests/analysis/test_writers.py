@@ -64,10 +64,28 @@ def test_latex_escapes() -> None:
 
 
 @pytest.mark.parametrize(
-    ("seeds", "words"), [(1, "nothing about retraining"), (3, "only 3 seeds"), (20, "20 seeds")]
+    ("seeds", "words"),
+    [
+        (1, "not other training runs"),
+        (2, "nearer to 50 %"),
+        (3, "nearer to 75 %"),
+        (7, "only 7 seeds the intervals are rough, and if anything too narrow"),
+        (20, "rest on 20 seeds"),
+    ],
 )
 def test_the_number_of_seeds_is_spoken_of(seeds: int, words: str) -> None:
     assert words in seed_note(seeds)
+
+
+def test_while_only_one_seed_is_played_the_table_speaks_of_one(
+    episodes: pd.DataFrame, spec: RunSpec
+) -> None:
+    begun = build_table(episodes.query("seed == 1 or length == 2"), spec, spec.tables[0])
+    text = to_markdown(begun)
+    assert seed_note(1) in text
+    assert "not all have 3 seeds" in text
+    assert "holds for these models" in text
+    assert text.count("**holds**") == 1  # of the row that has all three
 
 
 def test_bytes_are_reproducible(table: Table, episodes: pd.DataFrame, spec: RunSpec) -> None:

@@ -1,0 +1,204 @@
+"""Suites: one table over several runs, on the tiny maze."""
+
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import pandas as pd
+import pytest
+
+from orchestrator import worker
+from orchestrator.cli import main
+from orchestrator.errors import ChangedError, IncompleteError, LockedError, UsageError
+from orchestrator.merge import describe_suite
+from orchestrator.progress import Silent
+from orchestrator.reproduce_suite import reproduce_suite
+from orchestrator.rundir import RunDirectory
+from orchestrator.suite import Suite, load_asked, part_directory
+from tests.orchestrator.tiny import TINY, promised_bytes, serially
+
+SUITE = Path(__file__).with_name("suite.toml")
+OTHER_TASKS = """
+name = "lists"
+title = "Two lists of tasks"
+methods = ["no-stitch", "mb-stitch"]
+seeds = 1
+[[parts]]
+label = "short"
+base = "BASE"
+settings = { tasks = ["g0>g1"], step_limits = { 2 = 12, 3 = 30 } }
+[[parts]]
+label = "long"
+base = "BASE"
+settings = { tasks = ["g0>g3", "g0>g1>g2"] }
+[[tables]]
+id = "lists"
+paper = ""
+rows = "task"
+"""
+
+
+def levels() -> Suite:
+    suite = load_asked(str(SUITE), "smoke")
+    assert isinstance(suite, Suite)
+    return suite
+
+
+def lists(folder: Path) -> Suite:
+    file = folder / "lists.toml"
+    file.write_text(OTHER_TASKS.replace("BASE", str(TINY)))
+    suite = load_asked(str(file))
+    assert isinstance(suite, Suite)
+    return suite
+
+
+@pytest.fixture(autouse=True)
+def no_figures() -> Iterator[None]:
+    with mock.patch("analysis.report.draw_figures", return_value=[]):
+        yield
+
+
+def carry_out(suite: Suite, root: Path) -> RunDirectory:
+    return reproduce_suite(suite, serially(root / "out", root / "store"), Silent())
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("levels")
+    with mock.patch("analysis.report.draw_figures", return_value=[]):
+        carry_out(levels(), root)
+    return root
+
+
+@pytest.fixture
+def done(finished: Path, tmp_path: Path) -> Path:
+    shutil.copytree(finished, tmp_path / "done")
+    return tmp_path / "done"
+
+
+def own_scores(out: Path, label: str) -> pd.Series:
+    """Mean score of each method, from a part's own episodes; every task weighs the same."""
+    episodes = pd.read_parquet(out / "parts" / label / "episodes.parquet")
+    return episodes.groupby(["method", "task"])["score"].mean().groupby("method").mean()
+
+
+def test_a_row_is_a_part_s_own_numbers(finished: Path) -> None:
+    out = finished / "out"
+    table = pd.read_csv(out / "report" / "levels.csv").set_index(["row", "method"])
+    assert list(dict.fromkeys(row for row, _ in table.index)) == ["level-1", "level-2"]
+    for row, method in table.index:
+        own = own_scores(out, row)[method]
+        assert table["score"][row, method] == pytest.approx(own, abs=1e-6)
+    assert table["paper_score"]["level-1", "mb-stitch"] == pytest.approx(0.314)
+    gains = pd.read_csv(out / "report" / "levels-gains.csv")
+    asked = levels().parts[0].spec
+    assert set(gains["pairs"]) == {len(asked.all_tasks) * asked.episodes}
+    assert set(gains["method"]) == {"mb-stitch"}
+
+
+def test_parts_of_other_tasks_are_cut_at_their_own_limits(tmp_path: Path) -> None:
+    suite = lists(tmp_path)
+    out = carry_out(suite, tmp_path).path
+    table = pd.read_csv(out / "report" / "lists.csv").set_index(["row", "method"])["score"]
+    rows = {"g0 → g1": "short", "g0 → g3": "long", "g0 → g1 → g2": "long"}
+    assert set(table.index.get_level_values("row")) == set(rows)
+    for row, method in table.index:
+        episodes = pd.read_parquet(out / "parts" / rows[row] / "episodes.parquet")
+        played = episodes[episodes["task"] == row.replace(" → ", ">")]
+        own = played[played["method"] == method]["score"].mean()
+        assert table[row, method] == pytest.approx(own, abs=1e-6)
+    assert describe_suite(suite)["parts"][0]["step_limits"]["2"] == 12
+
+
+def test_again_does_nothing(done: Path) -> None:
+    files = [file for file in (done / "out").rglob("*.*") if "ledger" not in file.name]
+    before = {file: file.stat().st_mtime_ns for file in files}
+    with mock.patch("orchestrator.reproduce.open_executor", side_effect=AssertionError):
+        carry_out(levels(), done)
+    assert {file: file.stat().st_mtime_ns for file in files} == before
+
+
+def test_stopped_between_parts(finished: Path, tmp_path: Path) -> None:
+    import orchestrator.reproduce_suite as carrying
+
+    reproduce, calls = carrying.reproduce, []
+
+    def dying(*arguments: Any) -> RunDirectory:
+        calls.append(arguments)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return reproduce(*arguments)
+
+    with mock.patch.object(carrying, "reproduce", dying), pytest.raises(KeyboardInterrupt):
+        carry_out(levels(), tmp_path)
+    directory = RunDirectory(tmp_path / "out")
+    assert part_directory(directory, "level-1").finished
+    assert not directory.finished
+    main(["report", str(tmp_path / "out")])
+    assert "Partial table" in (tmp_path / "out" / "report" / "levels.md").read_text()
+    assert carry_out(levels(), tmp_path).finished
+    assert promised_bytes(tmp_path / "out") == promised_bytes(finished / "out")
+
+
+def test_a_part_that_gives_up_blocks(
+    done: Path, finished: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.rmtree(done / "out")
+    (done / "store" / "blocks.sqlite").unlink()
+    play = worker.play_segment
+    second = levels().parts[1].spec
+
+    def faulty(*arguments: Any) -> Any:
+        if any(getattr(item, "prefix", ()) == ("g0",) for item in arguments):
+            raise RuntimeError("the simulator fell over")
+        return play(*arguments)
+
+    monkeypatch.setattr(worker, "play_segment", faulty)
+    with pytest.raises(IncompleteError, match="blocks of level-1, level-2 were given up"):
+        carry_out(levels(), done)
+    text = (done / "out" / "report" / "levels.md").read_text()
+    assert "Partial table" in text
+    assert f"of {len(second.all_tasks) * second.episodes}" in text
+    monkeypatch.undo()
+    with mock.patch("analysis.report.draw_figures", return_value=[]):
+        carry_out(levels(), done)
+    assert promised_bytes(done / "out") == promised_bytes(finished / "out")
+
+
+def test_refusals(done: Path) -> None:
+    suite = levels()
+    changed = replace(suite.parts[1], spec=replace(suite.parts[1].spec, root_seed=1))
+    with pytest.raises(ChangedError, match="part level-2, root_seed: 0 → 1"):
+        carry_out(replace(suite, parts=(suite.parts[0], changed)), done)
+    with RunDirectory(done / "out").locked(), pytest.raises(LockedError, match="in use by"):
+        carry_out(suite, done)
+    with pytest.raises(UsageError, match="set seeds in the suite's file, or give --seeds"):
+        replace(
+            suite, parts=(suite.parts[0], replace(changed, spec=replace(changed.spec, seeds=2)))
+        )
+    with pytest.raises(UsageError, match="would be one row"):
+        replace(suite, tables=(replace(suite.tables[0], rows="task"),))
+
+
+def test_the_other_commands(done: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out, store = str(done / "out"), ["--store", str(done / "store")]
+    main(["plan", str(SUITE), "--scale", "smoke", "--episodes", "5", *store])
+    text = capsys.readouterr().out
+    assert "part level-1" in text
+    assert "all 2 parts: 240 episodes" in text  # 2 × 6 tasks × 4 methods × 5
+    main(["status", out, *store])
+    text = capsys.readouterr().out
+    assert text.count("artifacts ") == 2
+    main(["gc", out, *store])
+    text = capsys.readouterr().out
+    assert "would delete 0 blocks" in text
+    assert text.count("would delete") == 1
+    main(["compare", out, out])
+    assert "level-2" in capsys.readouterr().out
+    words = ["--executor", "serial", "--tracking-uri", "none", "--results", str(done / "results")]
+    main(["run", str(SUITE), "--scale", "smoke", "--out", out, *store, *words])
+    assert "# Two data sets" in capsys.readouterr().out
+    assert (done / "results" / "levels" / "scores.csv").is_file()

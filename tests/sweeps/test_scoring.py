@@ -1,0 +1,26 @@
+"""What a candidate's episodes come to."""
+
+from typing import cast
+
+import pandas as pd
+
+from orchestrator.methods import MBStitchConfig
+from orchestrator.spec import load_spec
+from sweeps.scoring import Showing
+
+
+def test_an_interval_is_about_other_tasks_too() -> None:
+    """Of two families one always gains and the other never does: nobody knows of a third."""
+    tasks = ["g0>g1", "g1>g0>g2"]
+    baseline = pd.DataFrame(
+        {"seed": 0, "task": task, "episode": range(6), "length": task.count(">") + 1,
+         "accomplished": 0}
+        for task in tasks
+    ).explode("episode")  # fmt: skip
+    gains = baseline["length"].where(baseline["task"] == tasks[0], 0)
+    config = cast(MBStitchConfig, load_spec("table1").method_config("mb-stitch"))
+    episodes = baseline.assign(accomplished=gains)
+    showing = Showing("mb-stitch", config, pd.DataFrame(), episodes, baseline)
+    result = showing.result("test")
+    assert (result["gain_low"], result["gain"], result["gain_high"]) == (0, 0.5, 1)
+    assert result["tasks"] == {"g0>g1": 1.0, "g1>g0>g2": 0.0}
