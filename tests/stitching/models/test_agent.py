@@ -161,9 +161,7 @@ def test_nobody_acts(space: ActionSpace) -> None:
 @pytest.mark.parametrize("condition", [0, 1])
 def test_networks_of_one_skill_each(space: ActionSpace, condition: int) -> None:
     """Of several skills' networks, each by itself what it would be alone."""
-    apart = {
-        f"{skill}.{name}": array for skill in (0, 1) for name, array in weights(skill).items()
-    }
+    apart = {f"{skill}.{name}": array for skill in (0, 1) for name, array in weights(skill).items()}
     together, alone = Agent(apart, CONDITIONS, space), Agent(weights(condition), CONDITIONS, space)
     seen = torch.from_numpy(states())
     assert together.values(seen, condition).equal(alone.values(seen, condition))
