@@ -41,26 +41,24 @@ def reported(report: Path, table: str) -> dict[str, float]:
 
 
 def seed_scores(episodes: pd.DataFrame, spec: RunSpec, entry: TableEntry) -> dict[str, float]:
-    """Scores of one seed by the table's rows, every task weighing the same.
+    """Scores of one seed by the table's rows, every task weighing the same, as a report has them.
 
-    The interval takes tasks as given and a score for a rate: as no score in [0, 1] varies more
-    than successes and failures of the same mean do, it errs on the wide side.
+    Intervals cover other episodes of this seed's models.
     """
     from analysis.rows import place_tasks
-    from analysis.statistics import wilson
+    from analysis.statistics import arrange, estimate, generator
 
-    places = place_tasks(spec, entry)[["task", "row"]]
-    tasks = episodes.merge(places, on="task").groupby(["row", "task"])["score"]
-    rows = tasks.agg(["mean", "size"]).groupby("row").agg({"mean": "mean", "size": "sum"})
-    low, high = wilson(rows["mean"].to_numpy() * rows["size"].to_numpy(), rows["size"].to_numpy())
-    cells = rows.rename(columns={"mean": "score", "size": "episodes"}).assign(
-        ci_low=low, ci_high=high
-    )
-    return {
-        f"{entry.id}/{row}/{column}": value
-        for row, cell in cells.to_dict("index").items()
-        for column, value in cell.items()
-    }
+    metrics: dict[str, float] = {}
+    places = place_tasks(spec, entry)[["task", "row"]].drop_duplicates()
+    for row, played in episodes.merge(places, on="task").groupby("row"):
+        cell = estimate(arrange(played, "score"), generator("tracking", entry.id, str(row)))
+        metrics |= {
+            f"{entry.id}/{row}/score": cell.mean,
+            f"{entry.id}/{row}/ci_low": cell.low,
+            f"{entry.id}/{row}/ci_high": cell.high,
+            f"{entry.id}/{row}/episodes": float(cell.episodes),
+        }
+    return metrics
 
 
 def learning_curves(method: str, seed: int, training: list[dict[str, Any]]) -> Curves:
