@@ -12,6 +12,7 @@ from orchestrator.kits import KITS
 from orchestrator.ledger import Ledger, Played
 from orchestrator.plan import Node, Plan
 from orchestrator.recipes import Recipe
+from orchestrator.spec import Spec
 from orchestrator.store import CorruptArtifactError, Store
 
 OTHER_SECONDS = 1.0  # of what nobody measured, such as data of the maze
@@ -66,8 +67,7 @@ def estimate(plan: Plan, store: Store, shared: Ledger) -> Estimate:
     runs = len(spec.methods) * spec.seeds * spec.episodes
     naive_segments = sum(len(task) for task in spec.all_tasks) * runs
     naive_steps = runs * sum(
-        min(spec.step_limits[len(task)], len(task) * (spec.rollout.skill_limit or spec.step_limit))
-        for task in spec.all_tasks
+        min(spec.step_limits[len(task)], len(task) * _skill_limit(spec)) for task in spec.all_tasks
     )
     return Estimate(
         artifacts={kind: (c[True], c[False]) for kind, c in artifacts.items()},
@@ -142,6 +142,11 @@ def _reference_seconds(recipe: Recipe) -> float:
     return costs.whole.get(recipe.kind, OTHER_SECONDS)
 
 
+def _skill_limit(spec: Spec) -> int:
+    """Most steps of one skill: its own limit, or the task's where it has none."""
+    return spec.rollout.skill_limit or spec.step_limit
+
+
 def _steps_in_tree(plan: Plan) -> int:
     """Most steps the tree can take: a limit of a skill's at each node, or of a task's on each path.
 
@@ -150,7 +155,7 @@ def _steps_in_tree(plan: Plan) -> int:
     """
     spec = plan.spec
     leaves = sum(1 for node in plan.nodes if node not in plan.children)
-    by_skill = len(plan.nodes) * (spec.rollout.skill_limit or spec.step_limit)
+    by_skill = len(plan.nodes) * _skill_limit(spec)
     return spec.episodes * min(leaves * spec.step_limit, by_skill)
 
 

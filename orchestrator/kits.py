@@ -100,6 +100,14 @@ def _sha256(file: str) -> str:
     return hashlib.sha256(Path(file).read_bytes()).hexdigest() if Path(file).is_file() else ""
 
 
+def _physics_illustrations(family: str, task: tuple[str, ...]) -> dict[str, Illustration]:
+    """A task played step by step, and models judged by the role "held-out"."""
+    return {
+        "showcase": Illustration(f"{family}-showcase", ("agent", "dynamics"), task),
+        "diagnosis": Illustration(f"{family}-diagnosis", ("agent", "dynamics", "held-out")),
+    }
+
+
 def _robosuite_kit(*task: str) -> Kit:
     return Kit(
         RobosuiteDataConfig,
@@ -115,10 +123,7 @@ def _robosuite_kit(*task: str) -> Kit:
         ),
         extras={"held-out": "robosuite-held-out"},
         for_extras=("held_out",),
-        illustrations={
-            "showcase": Illustration("robosuite-showcase", ("agent", "dynamics"), task),
-            "diagnosis": Illustration("robosuite-diagnosis", ("agent", "dynamics", "held-out")),
-        },
+        illustrations=_physics_illustrations("robosuite", task),
     )
 
 
@@ -155,14 +160,9 @@ KITS: dict[str, Kit] = {
         ),
         extras={"held-out": "kitchen-held-out"},
         for_extras=("held_out",),
-        illustrations={
-            "showcase": Illustration(
-                "kitchen-showcase",
-                ("agent", "dynamics"),
-                task=("microwave", "kettle", "bottom burner", "hinge cabinet"),
-            ),
-            "diagnosis": Illustration("kitchen-diagnosis", ("agent", "dynamics", "held-out")),
-        },
+        illustrations=_physics_illustrations(
+            "kitchen", ("microwave", "kettle", "bottom burner", "hinge cabinet")
+        ),
         label=_kitchen_label,
     ),
     "robosuite-door": _robosuite_kit("open door", "close door"),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -94,24 +96,38 @@ def reproduce(spec: Spec, settings: Settings, progress: Progress) -> RunDirector
     directory, watch = RunDirectory(settings.out), Stopwatch()
     with directory.locked():
         run_id = directory.settle(spec)
-        uri = settings.resolved_tracking_uri()
-        try:
+        with tracked(directory, settings, progress, watch):
             worked = _carry_out(spec, settings, directory, run_id, progress, watch)
-        except SkillstitchError:
-            publish(directory, uri, failed=True)
-            raise
-        if trouble := publish(directory, uri, finished=True):
-            progress.say(f"tracking: {trouble}")
-        watch.lap("tracking")
         if worked:
             directory.write_json("seconds.json", watch.rounded())
         if given_up := directory.read_json("quarantine.json"):
-            raise IncompleteError(
-                f"{len(given_up)} blocks were given up after repeated failures (see "
-                f"{directory.path / 'quarantine.json'}); the tables are marked as partial, and the "
-                "same command tries again"
-            )
+            raise partial_error(f"{len(given_up)} blocks", directory)
     return directory
+
+
+@contextmanager
+def tracked(
+    directory: RunDirectory, settings: Settings, progress: Progress, watch: Stopwatch
+) -> Iterator[None]:
+    """MLflow is told how the work ended; where it cannot be, that is said and fails nothing."""
+    uri = settings.resolved_tracking_uri()
+    try:
+        yield
+    except SkillstitchError:
+        publish(directory, uri, failed=True)
+        raise
+    if trouble := publish(directory, uri, finished=True):
+        progress.say(f"tracking: {trouble}")
+    watch.lap("tracking")
+
+
+def partial_error(blocks: str, directory: RunDirectory) -> IncompleteError:
+    """What to raise of a directory that is finished but for blocks that were given up."""
+    return IncompleteError(
+        f"{blocks} were given up after repeated failures (see "
+        f"{directory.path / 'quarantine.json'}); the tables are marked as partial, and the "
+        "same command tries again"
+    )
 
 
 def _carry_out(

@@ -11,7 +11,7 @@ from orchestrator.errors import IncompleteError, SkillstitchError
 from orchestrator.executors import open_executor
 from orchestrator.merge import describe_suite, write_merged
 from orchestrator.progress import Progress
-from orchestrator.reproduce import Settings, publish, reproduce
+from orchestrator.reproduce import Settings, partial_error, reproduce, tracked
 from orchestrator.rundir import RunDirectory
 from orchestrator.stopwatch import Stopwatch
 from orchestrator.store import storage_errors
@@ -29,33 +29,22 @@ def reproduce_suite(suite: Suite, settings: Settings, progress: Progress) -> Run
         run_id = directory.claim(
             describe_suite(suite), lambda: suite_differences(suite_of(directory), suite)
         )
-        uri = settings.resolved_tracking_uri()
         parts = {part.label: part_directory(directory, part.label) for part in suite.parts}
         done = directory.finished and all(part.finished for part in parts.values())
         if not done:
             directory.mark(finished=False)
-        try:
-            partial = _carry_out_parts(suite, settings, parts, progress, watch)
+        with tracked(directory, settings, progress, watch):
+            gave_up = _carry_out_parts(suite, settings, parts, progress, watch)
             if not done:
                 with storage_errors(directory.path):
                     write_merged(suite, directory, run_id)
                     build_report(directory.path)
                 directory.mark(finished=True)
                 watch.lap("report of all parts")
-        except SkillstitchError:
-            publish(directory, uri, failed=True)
-            raise
-        if trouble := publish(directory, uri, finished=True):
-            progress.say(f"tracking: {trouble}")
-        watch.lap("tracking")
         if not done:
             directory.write_json("seconds.json", watch.rounded())
-        if partial:
-            raise IncompleteError(
-                f"blocks of {', '.join(partial)} were given up after repeated failures (see "
-                f"{directory.path / 'quarantine.json'}); the tables are marked as partial, and the "
-                "same command tries again"
-            )
+        if gave_up:
+            raise partial_error(f"blocks of {', '.join(gave_up)}", directory)
     return directory
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from importlib import resources
 from importlib.resources.abc import Traversable
@@ -114,23 +115,29 @@ def check_spec(spec: Spec) -> None:
     if spec.benchmark not in BENCHMARKS:
         known = ", ".join(BENCHMARKS)
         raise UsageError(f"{where}: unknown benchmark {spec.benchmark!r}; there are {known}")
-    for name in (spec.name, *(table.id for table in spec.tables)):
-        if not NAME.fullmatch(name):
-            raise UsageError(f"{where}: {name!r} is no name; use letters, digits, '.', '_' and '-'")
+    check_names([spec.name, *(table.id for table in spec.tables)], where)
     _check_numbers(to_plain(spec), where)
     _check_tasks(spec, where)
     _check_methods(spec, where)
     ids = [table.id for table in spec.tables]
     for table in spec.tables:
-        if table.rows not in ROW_RULES:
-            rules = ", ".join(ROW_RULES)
-            raise UsageError(
-                f"{where}, table {table.id}: no rows {table.rows!r}; there are {rules}"
-            )
+        check_rows(table, f"{where}, table {table.id}")
         if ids.count(table.id) > 1:
             raise UsageError(f"{where}: two tables have the id {table.id!r}")
         if table.baseline and table.baseline not in spec.methods:
             raise UsageError(f"{where}, table {table.id}: the baseline is none of its methods")
+
+
+def check_names(names: Iterable[str], where: str) -> None:
+    """Names become part of paths."""
+    for name in names:
+        if not NAME.fullmatch(name):
+            raise UsageError(f"{where}: {name!r} is no name; use letters, digits, '.', '_' and '-'")
+
+
+def check_rows(table: TableSpec, where: str) -> None:
+    if table.rows not in ROW_RULES:
+        raise UsageError(f"{where}: no rows {table.rows!r}; there are {', '.join(ROW_RULES)}")
 
 
 # Wherever in a spec they stand.

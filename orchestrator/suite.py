@@ -7,17 +7,17 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from analysis.rows import ROW_RULES
 from analysis.run import plain_label
 from orchestrator.errors import UsageError
 from orchestrator.rundir import RunDirectory
 from orchestrator.spec import (
-    NAME,
     PACKAGED,
     Scale,
     Spec,
     TableSpec,
     at_scale,
+    check_names,
+    check_rows,
     differences,
     packaged_specs,
     plain_differences,
@@ -83,9 +83,7 @@ def check_suite(suite: Suite) -> None:
     where = f"suite {suite.name}"
     labels = [part.label for part in suite.parts]
     ids = [table.id for table in suite.tables]
-    for name in (suite.name, *labels, *ids):
-        if not NAME.fullmatch(name):
-            raise UsageError(f"{where}: {name!r} is no name; use letters, digits, '.', '_' and '-'")
+    check_names([suite.name, *labels, *ids], where)
     for what, names in (("parts", labels), ("tables", ids)):
         if not names:
             raise UsageError(f"{where}: no {what}; add [[{what}]]")
@@ -103,8 +101,7 @@ def check_suite(suite: Suite) -> None:
 
 
 def _check_table(suite: Suite, table: TableSpec, where: str) -> None:
-    if table.rows not in ROW_RULES:
-        raise UsageError(f"{where}: no rows {table.rows!r}; there are {', '.join(ROW_RULES)}")
+    check_rows(table, where)
     if suite.by_variant and table.rows != "variant":
         raise UsageError(
             f"{where}: rows {table.rows!r} beside another table's rows 'variant', where each "

@@ -46,7 +46,9 @@ def draw_figures(run: Run, tables: list[Table], folder: Path) -> list[Drawn]:
             )
             drawn.append(Drawn(name, caption, table.entry.id))
         if run.showcase:
-            drawn += SHOWCASES[run.showcase.get("benchmark", "maze")](run, folder)
+            drawn += SHOWCASES.get(run.showcase.get("benchmark", "maze"), _values_showcase)(
+                run, folder
+            )
         pair = _first_and_last_method(run)
         if pair:
             shown = shown_pairs(shown_orders(run.datasets) or [])
@@ -125,12 +127,7 @@ def _which_episode(run: Run) -> str:
     return f"{played}: {last} accomplishes more than {first} in {better}; the first of them."
 
 
-SHOWCASES = {
-    "maze": _maze_showcase,
-    "kitchen": _kitchen_showcase,
-    "robosuite-door": _values_showcase,
-    "robosuite-can": _values_showcase,
-}
+SHOWCASES = {"maze": _maze_showcase, "kitchen": _kitchen_showcase}  # all others: the values
 
 
 def _diagnosis(run: Run, folder: Path) -> list[Drawn]:

@@ -49,7 +49,7 @@ def seed_scores(episodes: pd.DataFrame, spec: RunSpec, entry: TableEntry) -> dic
     from analysis.statistics import arrange, estimate, generator
 
     metrics: dict[str, float] = {}
-    places = place_tasks(spec, entry)[["task", "row"]].drop_duplicates()
+    places = place_tasks(spec, entry)[["task", "row"]]
     for row, played in episodes.merge(places, on="task").groupby("row"):
         cell = estimate(arrange(played, "score"), generator("tracking", entry.id, str(row)))
         metrics |= {
