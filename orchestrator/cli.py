@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -18,6 +19,7 @@ from orchestrator.spec import Spec, packaged_specs
 from orchestrator.suite import Suite, is_suite, load_asked, part_directories, with_specs
 
 INTERRUPTED = 130
+UNREAD = 141  # as shells count a process that SIGPIPE ended
 ERRORS = Console(stderr=True, highlight=False, soft_wrap=True)
 OUTPUT = Console(highlight=False, soft_wrap=True)
 
@@ -60,6 +62,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except KeyboardInterrupt:
         ERRORS.print("interrupted; the same command resumes", markup=False)
         sys.exit(INTERRUPTED)
+    except BrokenPipeError:  # nobody reads on, as after `| head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(UNREAD)
 
 
 def _dispatch(words: list[str]) -> None:

@@ -307,6 +307,17 @@ def test_an_interrupt_is_130(cli: Cli, trained: Place) -> None:
 # The other commands
 
 
+def test_output_that_nobody_reads_is_no_error() -> None:
+    command = [sys.executable, "-m", "orchestrator.cli", "run", "--help"]
+    unread = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert unread.stdout
+    assert unread.stderr
+    unread.stdout.close()  # as `| head` does when it has enough
+    assert unread.stderr.read() == ""
+    unread.stderr.close()
+    assert unread.wait() == 141
+
+
 def test_status(cli: Cli, finished: Place, plan: Plan) -> None:
     answer = cli("status", finished.out, "--store", finished.store_root)
     assert answer.code == 0

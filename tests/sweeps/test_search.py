@@ -16,6 +16,7 @@ from sweeps.candidates import group, method_of
 from sweeps.search import rounds, search_spec
 from sweeps.space import Dimension
 from sweeps.spec import Confirm, Pruner, base_spec
+from sweeps.study import RESULT, SweepStudy
 from sweeps.winner import with_winner
 from tests.orchestrator.tiny import Counted, Place
 from tests.sweeps.tiny import sweep_in, tiny_sweep
@@ -142,6 +143,22 @@ def test_hopeless_trials_are_given_up_and_are_never_the_best(trained: Path) -> N
     winner = json.loads((trained / "sweep" / "winner.json").read_text())
     assert not winner["search"]["pruned"]
     assert not set(range(sweep.batch)) & {trial["trial"] for trial in given_up}, "nothing to judge"
+
+
+def test_a_given_up_trial_is_told_as_what_it_would_be_on_all_tasks(trained: Path) -> None:
+    """Its tasks may have been easy ones: it is as far from the best trial's gain as on these."""
+    sweep = tiny_sweep(pruner=Pruner(rounds=4, p=0.45, startup=2), trials=12)
+    sweep_in(trained, sweep)
+    told = SweepStudy(sweep, trained / "sweep").trials
+    found = [trial.user_attrs[RESULT] for trial in told]
+    given_up = [number for number, result in enumerate(found) if result["pruned"]]
+    for number in given_up:
+        before = found[: number - number % sweep.batch]  # what was known when its batch was judged
+        best = max((one for one in before if not one["pruned"]), key=lambda one: one["gain"])
+        behind = [gain - best["tasks"][task] for task, gain in found[number]["tasks"].items()]
+        assert 0 < len(behind) < len(best["tasks"])
+        assert told[number].values == [pytest.approx(best["gain"] + np.mean(behind))]
+    assert given_up
 
 
 def test_confirmation_is_on_unseen_tasks_and_seeds(finished: Path) -> None:
