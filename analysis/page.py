@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from analysis.figures import Drawn
-from analysis.page_studies import models_section, pairs_section
+from analysis.page_studies import models_section, pairs_section, stitches_section
 from analysis.page_tables import claims_html, gains_html, html_table, scores_html
 from analysis.run import Run
 from analysis.skills import permutation_scores, single_skill_rates
@@ -19,6 +19,7 @@ from analysis.verdicts import error_reading, explanation
 from analysis.writers import BOOTSTRAP, describe, seed_note
 
 OF_MODELS = ("diagnosis", "diagnosis-values")
+OF_STITCHES = ("anatomy",)
 """Figures that stand beside what they are about, and not with those of the whole run."""
 
 PERMUTATION_COLUMNS: list[dict[str, Any]] = [
@@ -53,7 +54,7 @@ def render_page(
             "".join(
                 _figure(figure, figures)
                 for figure in drawn
-                if not figure.table and figure.name not in OF_MODELS
+                if not figure.table and figure.name not in OF_MODELS + OF_STITCHES
             ),
         ),
         "pairs": ("Pairs of skills", pairs_section(run, studies.get("pair-groups"))),
@@ -61,6 +62,11 @@ def render_page(
             "Are the models right?",
             models_section(run, studies.get("models"))
             + "".join(_figure(figure, figures) for figure in drawn if figure.name in OF_MODELS),
+        ),
+        "stitches": (
+            "When does stitching hurt?",
+            stitches_section(run, studies)
+            + "".join(_figure(figure, figures) for figure in drawn if figure.name in OF_STITCHES),
         ),
         "skills": ("Single skills", _single_skills(run)),
         "every-task": ("Every permutation", _permutation_section(run)),

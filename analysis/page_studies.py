@@ -1,10 +1,12 @@
 """Sections of the page about pairs of skills and about the models behind the scores."""
 
 import math
+from collections.abc import Mapping
 from html import escape
 
 import pandas as pd
 
+from analysis.anatomy import OUTCOMES, WARNINGS
 from analysis.page_tables import html_table
 from analysis.pairs import BASELINE, shown_orders
 from analysis.run import Run
@@ -158,6 +160,85 @@ def _dynamics(run: Run, known: Known) -> str:
             "correlation of the members' disagreement with the error. Of the first seed's models."
         )
     )
+
+
+def stitches_section(run: Run, studies: Mapping[str, pd.DataFrame]) -> str:
+    """What stitches did to the second skill, what was expected of them, and what warned."""
+    if "anatomy" not in studies or studies["stitches"].empty:
+        return ""
+    parts = studies["anatomy"].to_dict("records")
+    header = [
+        "Data", "Second skill without", "with a stitch", "Stitches", "Helped", "Hurt",
+        "Gain predicted", "Gain realised", "ρ", *(f"{name} (AUC)" for name in WARNINGS.values()),
+    ]  # fmt: skip
+    lines = [
+        [
+            row["part"] or "all",
+            *(f"{row[f'successes_{how}']} of {row['episodes']}" for how in ("without", "with")),
+            *(str(row[name]) for name in ("stitches", "helped", "hurt")),
+            *(_signed(row[name], 3) for name in ("predicted_gain", "realised_gain")),
+            _signed(row["rank_correlation"], 2),
+            *(_told(row[f"auc_{name}"]) for name in WARNINGS),
+        ]
+        for row in parts
+    ]
+    return (
+        html_table(header, lines)
+        + _by_outcome(studies["stitches"])
+        + _note(
+            "Every ordered pair of skills, or some of them, from where the first one succeeded: "
+            "once without a stitch and once with one, under the same random numbers. A stitch "
+            "helped where the second skill failed without and succeeded with it, and hurt where it "
+            f"was the other way round; these are counts of few episodes ({_tried(run)}) by the "
+            "first seed's models, and no interval goes with them. Gain: of the next skill's value "
+            "by a plan's first action, on average; ρ is the rank correlation of predicted with "
+            "realised gains. AUC: how likely a stitch that hurt had the higher number of two, one "
+            "that hurt and one that did not; 0.5 tells nothing, less is a number that is lower "
+            "where stitches hurt. Spreads are those of Eq. 2 at the state predicted for a plan's "
+            "first action, averaged over the stitch; distances are to the next skill's own "
+            "demonstrations, in standard deviations of the data."
+        )
+    )
+
+
+def _by_outcome(stitches: pd.DataFrame) -> str:
+    """Means over the stitches of each outcome, by part."""
+    lines = [
+        [
+            f"{part!s}: {name}" if part else name,
+            str(len(own)),
+            f"{own['steps'].mean():.1f}",
+            *(
+                f"{own[f'{what}_start'].mean():.{digits}f} → {own[f'{what}_end'].mean():.{digits}f}"
+                for what, digits in (("value", 2), ("distance", 3))
+            ),
+            f"{own['value_spread'].mean():.3f}",
+            f"{own['dynamics_spread'].mean():.4f}",
+        ]
+        for part, of_part in stitches.groupby("part", sort=False)
+        for name in OUTCOMES.values()
+        if len(own := of_part[of_part["outcome"] == name])
+    ]
+    header = [
+        "The stitch", "Stitches", "Steps", "Value", "Distance to data", "Spread of values",
+        "Spread of dynamics",
+    ]  # fmt: skip
+    return html_table(header, lines)
+
+
+def _tried(run: Run) -> str:
+    """ "20 pairs, 6 episodes of each" """
+    study = max(run.anatomy.values(), key=lambda one: len(one["pairs"]))
+    pairs = len(study["pairs"])
+    return f"{pairs} pair{'s'[: pairs != 1]}, {study['episodes']} episodes of each"
+
+
+def _signed(number: float, digits: int) -> str:
+    return UNKNOWN if math.isnan(number) else f"{number:+.{digits}f}"
+
+
+def _told(area: float) -> str:
+    return UNKNOWN if math.isnan(area) else f"{area:.2f}"
 
 
 def _note(text: str) -> str:

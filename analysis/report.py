@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from analysis.anatomy import anatomy_table, stitch_table
 from analysis.episodes import write_episodes
 from analysis.figures import Drawn, draw_figures
 from analysis.files import replaced_folder
@@ -101,6 +102,8 @@ def _studies(run: Run) -> Studies:
         studies["pair-groups"] = pair_groups(seconds, orders, run.spec)
     if run.diagnosis:
         studies["models"] = model_table(run)
+    if run.anatomy:
+        studies["anatomy"], studies["stitches"] = anatomy_table(run), stitch_table(run)
     return studies
 
 

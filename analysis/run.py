@@ -156,6 +156,7 @@ class Run:
     showcase: dict[str, Any]
     datasets: list[dict[str, Any]]
     diagnosis: dict[str, Any]
+    anatomy: dict[str, Any]  # by part, of a merged run; else by "" alone
 
 
 def load_run(run_dir: Path) -> Run:
@@ -178,7 +179,14 @@ def load_run(run_dir: Path) -> Run:
         showcase=_read_json(run_dir / "showcase.json", {}),
         datasets=_read_json(run_dir / "datasets.json", []),
         diagnosis=_read_json(run_dir / "diagnosis.json", {}),
+        anatomy=_by_part(_read_json(run_dir / "anatomy.json", {})),
     )
+
+
+def _by_part(study: dict[str, Any]) -> dict[str, Any]:
+    """A study of each part, by its label: merged runs keep them so, others have but one."""
+    parts: dict[str, Any] = study.get("parts", {"": study} if study else {})
+    return parts
 
 
 def _read_json(path: Path, default: Any) -> Any:

@@ -16,6 +16,8 @@ from stitching.data.robosuite.demonstrations import RobosuiteDataConfig
 
 DataConfig = MazeDataConfig | KitchenDataConfig | RobosuiteDataConfig
 
+TEACHING = "every dataset that teaches"  # among an illustration's inputs
+
 
 @dataclass(frozen=True)
 class Dataset:
@@ -31,8 +33,10 @@ class Illustration:
     """Something to look at that no score depends on, made last and by seed 0's models."""
 
     kind: str
-    inputs: tuple[str, ...]  # "agent", "dynamics", or roles of datasets and of `extras`
+    inputs: tuple[str, ...]  # "agent", "dynamics", TEACHING, or roles of datasets and of `extras`
     task: tuple[str, ...] = ()  # played in it, where the spec has it; empty: none is
+    pairs: int = 0  # at most, of skills that follow one another in the spec's tasks
+    episodes: int = 0  # at most, of each such pair
 
 
 @dataclass(frozen=True)
@@ -100,11 +104,16 @@ def _sha256(file: str) -> str:
     return hashlib.sha256(Path(file).read_bytes()).hexdigest() if Path(file).is_file() else ""
 
 
-def _physics_illustrations(family: str, task: tuple[str, ...]) -> dict[str, Illustration]:
-    """A task played step by step, and models judged by the role "held-out"."""
+def _physics_illustrations(
+    family: str, task: tuple[str, ...], pairs: int, episodes: int
+) -> dict[str, Illustration]:
+    """A task played step by step, models judged by the role "held-out", stitches taken apart."""
     return {
         "showcase": Illustration(f"{family}-showcase", ("agent", "dynamics"), task),
         "diagnosis": Illustration(f"{family}-diagnosis", ("agent", "dynamics", "held-out")),
+        "anatomy": Illustration(
+            f"{family}-anatomy", ("agent", "dynamics", TEACHING), pairs=pairs, episodes=episodes
+        ),
     }
 
 
@@ -115,7 +124,11 @@ def _robosuite_kit(*task: str) -> Kit:
         Costs(
             update={"agent": 0.03, "mf-policy": 0.01, "dynamics": 0.01},
             demonstration={"robosuite-demonstrations": 0.6, "robosuite-held-out": 0.6},
-            whole={"robosuite-diagnosis": 60.0, "robosuite-showcase": 60.0},
+            whole={
+                "robosuite-anatomy": 150.0,
+                "robosuite-diagnosis": 60.0,
+                "robosuite-showcase": 60.0,
+            },
             planned_segment=4.0,
             segment=0.6,
             success=0.5,
@@ -123,7 +136,7 @@ def _robosuite_kit(*task: str) -> Kit:
         ),
         extras={"held-out": "robosuite-held-out"},
         for_extras=("held_out",),
-        illustrations=_physics_illustrations("robosuite", task),
+        illustrations=_physics_illustrations("robosuite", task, pairs=1, episodes=30),
     )
 
 
@@ -152,7 +165,11 @@ KITS: dict[str, Kit] = {
         Costs(
             update={"agent": 0.026, "mf-policy": 0.016, "dynamics": 0.011},
             demonstration={"kitchen-demonstrations": 0.6, "kitchen-held-out": 15.0},
-            whole={"kitchen-diagnosis": 120.0, "kitchen-showcase": 60.0},
+            whole={
+                "kitchen-anatomy": 300.0,
+                "kitchen-diagnosis": 120.0,
+                "kitchen-showcase": 60.0,
+            },
             planned_segment=2.0,
             segment=0.2,
             success=0.4,
@@ -161,7 +178,10 @@ KITS: dict[str, Kit] = {
         extras={"held-out": "kitchen-held-out"},
         for_extras=("held_out",),
         illustrations=_physics_illustrations(
-            "kitchen", ("microwave", "kettle", "bottom burner", "hinge cabinet")
+            "kitchen",
+            ("microwave", "kettle", "bottom burner", "hinge cabinet"),
+            pairs=20,
+            episodes=6,
         ),
         label=_kitchen_label,
     ),

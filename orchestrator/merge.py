@@ -153,6 +153,10 @@ def write_merged(suite: Suite, directory: RunDirectory, run_id: str) -> None:
     directory.write_json("quarantine.json", gathered("quarantine.json", _given_up))
     directory.write_json("training.json", gathered("training.json", _trained))
     directory.write_json("datasets.json", gathered("datasets.json", _dataset))
+    anatomies = {label: part.read_json("anatomy.json") for label, part in there.items()}
+    parts = {label: anatomy_of_part(one, named[label]) for label, one in anatomies.items() if one}
+    if parts:
+        directory.write_json("anatomy.json", {"parts": parts})
     made = {label: part.read_json("provenance.json") for label, part in there.items()}
     directory.write_json("provenance.json", _provenance(made) | {"run_id": run_id})
 
@@ -188,6 +192,20 @@ def _dataset(dataset: Plain, naming: Naming) -> Iterator[Plain]:
     """Without the orders that its demonstrations show: they hold for one part's pairs alone."""
     kept = {name: value for name, value in dataset.items() if name != "orders"}
     yield kept | {"name": f"{naming.part.label}: {dataset['name']}"}
+
+
+def anatomy_of_part(study: Plain, naming: Naming) -> Plain:
+    """Stitches of a part, between skills as they are called where all parts meet."""
+
+    def renamed(entry: Plain) -> Plain:
+        return entry | {name: naming.skill(entry[name]) for name in ("first", "second")}
+
+    typical = study["typical_distance"].items()
+    return study | {
+        "pairs": [renamed(pair) for pair in study["pairs"]],
+        "stitches": [renamed(stitch) for stitch in study["stitches"]],
+        "typical_distance": {naming.skill(skill): distance for skill, distance in typical},
+    }
 
 
 def _provenance(made: dict[str, Plain]) -> Plain:

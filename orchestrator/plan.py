@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain, pairwise
+from typing import Any
 
 from orchestrator.builders import BLOCK_CODE, BLOCK_SETUP
 from orchestrator.jobs import BlockTask
-from orchestrator.kits import KITS, Illustration
+from orchestrator.kits import KITS, TEACHING, Illustration
 from orchestrator.methods import METHODS, MFStitchConfig, method_name
 from orchestrator.recipes import Recipe, code_fingerprint, digest
 from orchestrator.spec import Spec
@@ -151,7 +153,8 @@ def make_plan(spec: Spec) -> Plan:
         }
         there = {"agent": agents[0], "dynamics": dynamics[0], **datasets, **extras}
         for name, one in kit.illustrations.items():
-            inputs = {role: there[role] for role in one.inputs}
+            roles = [demonstrations if role == TEACHING else (role,) for role in one.inputs]
+            inputs = {role: there[role] for role in chain.from_iterable(roles)}
             illustrations[name] = add(one.kind, _illustrated(spec, one), inputs)
     return Plan(
         spec, recipes, agents, dynamics, mf_policies, datasets, illustrations, tuple(_nodes(spec))
@@ -159,7 +162,10 @@ def make_plan(spec: Spec) -> Plan:
 
 
 def _illustrated(spec: Spec, illustration: Illustration) -> Plain:
-    """Parameters of an illustration; one that plays a task does so by No- and MB-Stitch."""
+    """Parameters of an illustration; one that plays a task does so by No- and MB-Stitch.
+
+    One that takes stitches apart is told of the first MB-Stitch only: it knows what No-Stitch is.
+    """
     params: Plain = {
         "configs": {"dynamics": to_plain(spec.dynamics)},
         "rollout": to_plain(spec.rollout),
@@ -167,19 +173,41 @@ def _illustrated(spec: Spec, illustration: Illustration) -> Plain:
         "root_seed": spec.root_seed,
         "seed": 0,
     }
+    if illustration.pairs:
+        return params | {
+            "methods": _settings(spec, "mb-stitch")[:1],
+            "pairs": _spread_out(_neighbours(spec), illustration.pairs),
+            "episodes": min(illustration.episodes, spec.episodes),
+        }
     task = illustration.task
     if not task:
         return params | {"horizon": spec.mb_stitch.horizon}
-    shown = [
-        method
-        for kind in ("no-stitch", "mb-stitch")  # whatever their order in the spec
+    return params | {
+        # Whatever their order in the spec.
+        "methods": _settings(spec, "no-stitch") + _settings(spec, "mb-stitch"),
+        "task": task if task in spec.all_tasks else max(spec.all_tasks, key=len),
+    }
+
+
+def _settings(spec: Spec, kind: str) -> list[list[Any]]:
+    """The spec's methods of a kind, each with its settings."""
+    return [
+        [method, to_plain(spec.method_config(method))]
         for method in spec.methods
         if method_name(method) == kind
     ]
-    return params | {
-        "methods": [[method, to_plain(spec.method_config(method))] for method in shown],
-        "task": task if task in spec.all_tasks else max(spec.all_tasks, key=len),
-    }
+
+
+def _neighbours(spec: Spec) -> list[Prefix]:
+    """Skills that follow one another in some task, each pair once."""
+    return list(dict.fromkeys(pair for task in spec.all_tasks for pair in pairwise(task)))
+
+
+def _spread_out(pairs: list[Prefix], most: int) -> list[Prefix]:
+    """At most so many, at equal distances, with the first and the last."""
+    if len(pairs) <= most:
+        return pairs
+    return [pairs[round(i * (len(pairs) - 1) / max(1, most - 1))] for i in range(most)]
 
 
 def _nodes(spec: Spec) -> list[Node]:

@@ -34,7 +34,7 @@ class RunDirectory:
     ledger.sqlite     every finished block
     provenance.json   where, when and with what it was made
     segments.parquet, episodes.parquet, training.json, datasets.json, report/
-    showcase.json, diagnosis.json  what only figures need, where the benchmark has it
+    showcase.json, diagnosis.json, anatomy.json  what only figures need, where the benchmark has it
     quarantine.json   blocks that were given up
     seconds.json      where the time of the last command that did any work went
     finished          there when all of the above is

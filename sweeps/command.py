@@ -33,7 +33,9 @@ class SweepCommand:
     workers: int | None = None  # default: all cores, or all of the cluster's
     address: str | None = None  # of a Ray cluster to join
     tracking_uri: str | None = None  # MLflow; default: SQLite beside the store; none: off
-    results: Path = Path("results")  # a grid's tables are written to RESULTS/<table>/
+    results: Path = Path(
+        "results"
+    )  # kept with the code: RESULTS/<table>/ of a grid, else RESULTS/<name>/
     plan: bool = False  # only say what there is already, and what a trial takes
 
 

@@ -27,7 +27,10 @@ SHOWN = 10  # of the best trials
 def write_report(
     sweep: SweepSpec, study: SweepStudy, directory: RunDirectory, results: Path | None
 ) -> None:
-    """Write report/, and with `results` also what is kept with the code, if there is a table."""
+    """Write report/, and with `results` also what is kept with the code.
+
+    That is RESULTS/<table>/ of a grid, as of any run, and the report itself of any other sweep.
+    """
     trials = directory.read_json("trials.json")
     confirmed = directory.read_json("confirm.json") or {}
     importances = field_importances(study)
@@ -52,6 +55,10 @@ def write_report(
                 for suffix in ("svg", "png"):
                     source = directory.path / "report" / "figures" / f"{name}.{suffix}"
                     shutil.copyfile(source, exported / "figures" / f"sweep-{source.name}")
+    elif results is not None:
+        with replaced_folder(results / sweep.name) as folder:
+            shutil.copytree(directory.path / "report", folder, dirs_exist_ok=True)
+            shutil.copyfile(directory.path / "provenance.json", folder / "provenance.json")
 
 
 def field_importances(study: SweepStudy) -> dict[str, float]:

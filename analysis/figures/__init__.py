@@ -5,12 +5,15 @@ from pathlib import Path
 
 import numpy as np
 
+from analysis.anatomy import begun
+from analysis.figures.anatomy import draw_anatomy
 from analysis.figures.curves import draw_curves
 from analysis.figures.diagnosis import draw_predictions, draw_value_curves
-from analysis.figures.frames import NoPictureError, render_frames
-from analysis.figures.kitchen import draw_sheet, draw_values, sheet_steps
+from analysis.figures.frames import render_frames
 from analysis.figures.maze import draw_showcase
 from analysis.figures.pairs import draw_pairs
+from analysis.figures.physics import draw_sheet, draw_values, segment_labels, sheet_steps
+from analysis.figures.scenes import VIEWS, NoPictureError, scene_of
 from analysis.figures.scores import draw_scores
 from analysis.figures.style import house_style, save
 from analysis.pairs import shown_orders, shown_pairs
@@ -46,9 +49,8 @@ def draw_figures(run: Run, tables: list[Table], folder: Path) -> list[Drawn]:
             )
             drawn.append(Drawn(name, caption, table.entry.id))
         if run.showcase:
-            drawn += SHOWCASES.get(run.showcase.get("benchmark", "maze"), _values_showcase)(
-                run, folder
-            )
+            benchmark = run.showcase.get("benchmark", "maze")
+            drawn += SHOWCASES.get(benchmark, _physics_showcase)(run, folder)
         pair = _first_and_last_method(run)
         if pair:
             shown = shown_pairs(shown_orders(run.datasets) or [])
@@ -56,6 +58,9 @@ def draw_figures(run: Run, tables: list[Table], folder: Path) -> list[Drawn]:
             save(draw_pairs(run.segments, run.spec, pair, framed), folder, "pairs")
             drawn.append(Drawn("pairs", PAIRS_CAPTION + (FRAMED if framed else ""), ""))
         drawn += _diagnosis(run, folder)
+        if any(begun(study) for study in run.anatomy.values()):
+            save(draw_anatomy(run.anatomy), folder, "anatomy")
+            drawn.append(Drawn("anatomy", ANATOMY_CAPTION, ""))
         if run.training:
             save(draw_curves(run.training), folder, "curves")
             drawn.append(Drawn("curves", "Training, one line for each trained model.", ""))
@@ -76,8 +81,8 @@ VALUES_CAPTION = (
     "stitching is hatched and red."
 )
 SHEET_CAPTION = (
-    "The episode above under {method}: frames at equal steps, and every stitch's first and last "
-    "step, framed in red."
+    "The episode above under {method}: frames at equal steps, every skill's last step, and every "
+    "stitch's first and last step, framed in red."
 )
 PREDICTIONS_CAPTION = (
     "Predictions of the dynamics on held-out demonstrations. Left: root mean square error over "
@@ -90,28 +95,42 @@ VALUE_CURVES_CAPTION = (
     "ensemble's mean spread. ρ is the rank correlation of value with time, averaged over them."
 )
 
+ANATOMY_CAPTION = (
+    "Stitches of the first seed's models, coloured by what came of them: each episode was also "
+    "played on from the same state without a stitch. From left to right: the next skill's value, "
+    "ensemble mean, along each stitch; distance to the nearest state of that skill's own "
+    "demonstrations (1: one standard deviation in every number of the state), above the dashed "
+    "line the stitch led away from them, dotted how near demonstrations are to one another; what "
+    "each plan's first action was to gain in value and did, below the dashed line less than "
+    "predicted; and how much the value members and the dynamics members disagreed about the state "
+    "predicted, on average over the stitch: the two variances that Eq. 2 subtracts."
+)
+
 
 def _maze_showcase(run: Run, folder: Path) -> list[Drawn]:
     save(draw_showcase(run.showcase, run.spec.methods), folder, "showcase")
     return [Drawn("showcase", SHOWCASE_CAPTION, "")]
 
 
-def _values_showcase(run: Run, folder: Path) -> list[Drawn]:
+def _physics_showcase(run: Run, folder: Path) -> list[Drawn]:
     save(draw_values(run.showcase, run.spec), folder, "stitch-values")
-    return [Drawn("stitch-values", f"{VALUES_CAPTION} {_which_episode(run)}", "")]
+    values = Drawn("stitch-values", f"{VALUES_CAPTION} {_which_episode(run)}", "")
+    return [values, _contact_sheet(run, folder)]
 
 
-def _kitchen_showcase(run: Run, folder: Path) -> list[Drawn]:
-    drawn = _values_showcase(run, folder)
-    episode = run.showcase["episodes"][-1]
+def _contact_sheet(run: Run, folder: Path) -> Drawn:
+    showcase, episode = run.showcase, run.showcase["episodes"][-1]
     steps = sheet_steps(episode)
     try:
-        frames = render_frames(np.array(episode["positions"])[steps])
+        scene = scene_of(showcase, episode)
+        frames = render_frames(scene, np.array(episode["positions"])[steps])
     except NoPictureError as error:
-        return [*drawn, Drawn("contact-sheet", "", "", f"no contact sheet: {error}")]
-    save(draw_sheet(episode, steps, frames, run.spec), folder, "contact-sheet", image_dpi=144)
+        return Drawn("contact-sheet", "", "", f"no contact sheet: {error}")
+    sheet = draw_sheet(episode, steps, frames, segment_labels(showcase, run.spec))
+    save(sheet, folder, "contact-sheet", image_dpi=144)
     method = run.spec.methods.get(episode["method"], episode["method"])
-    return [*drawn, Drawn("contact-sheet", SHEET_CAPTION.format(method=method), "")]
+    note = VIEWS[showcase["benchmark"]].note
+    return Drawn("contact-sheet", f"{SHEET_CAPTION.format(method=method)} {note}".strip(), "")
 
 
 def _which_episode(run: Run) -> str:
@@ -127,7 +146,7 @@ def _which_episode(run: Run) -> str:
     return f"{played}: {last} accomplishes more than {first} in {better}; the first of them."
 
 
-SHOWCASES = {"maze": _maze_showcase, "kitchen": _kitchen_showcase}  # all others: the values
+SHOWCASES = {"maze": _maze_showcase}  # all others: physics
 
 
 def _diagnosis(run: Run, folder: Path) -> list[Drawn]:

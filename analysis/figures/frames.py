@@ -1,32 +1,32 @@
-"""Frames of the Kitchen, drawn by a process of its own: see `analysis.render`."""
+"""Frames of an episode, drawn by a process of its own: see `analysis.render`."""
 
+import json
 import os
 import subprocess
 import sys
-from importlib.util import find_spec
+from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
-MODEL = "envs/assets/kitchen_franka/kitchen_assets/kitchen_env_model.xml"
+from analysis.figures.scenes import NoPictureError
+
 BACKENDS = ("egl", "osmesa")  # of MuJoCo, those that need no display
 MOST_SECONDS = 300  # of drawing; a driver that hangs must not hang the report
 
 
-class NoPictureError(Exception):
-    """There is no drawing here; the message says why and what to install."""
-
-
-def render_frames(positions: np.ndarray) -> np.ndarray:
-    """(N, 30) generalised positions -> (N, height, width, 3) uint8, or NoPictureError."""
-    model = _model_file()
+def render_frames(scene: Mapping[str, Any], positions: np.ndarray) -> np.ndarray:
+    """(N, nq) generalised positions -> (N, height, width, 3) uint8, or NoPictureError."""
     with TemporaryDirectory() as folder:
-        given, drawn = Path(folder) / "positions.npy", Path(folder) / "frames.npy"
-        np.save(given, positions)
+        names = ("scene.json", "positions.npy", "frames.npy")
+        described, recorded, drawn = (Path(folder) / name for name in names)
+        described.write_text(json.dumps(scene))
+        np.save(recorded, positions)
         complaints = []
         for backend in BACKENDS:
-            complaint = _render(backend, model, given, drawn)
+            complaint = _render(backend, described, recorded, drawn)
             if not complaint:
                 return np.asarray(np.load(drawn))
             if "No module named 'mujoco'" in complaint:
@@ -37,18 +37,11 @@ def render_frames(positions: np.ndarray) -> np.ndarray:
     )
 
 
-def _model_file() -> Path:
-    package = find_spec("gymnasium_robotics")  # importing it prints, and is slow
-    if package is None or package.origin is None:
-        raise NoPictureError("gymnasium-robotics, which has the model, is not installed")
-    return Path(package.origin).parent / MODEL
-
-
-def _render(backend: str, model: Path, positions: Path, target: Path) -> str:
+def _render(backend: str, *files: Path) -> str:
     """Draws with one of MuJoCo's backends; returns why not, if not."""
     try:
         run = subprocess.run(
-            [sys.executable, "-m", "analysis.render", str(model), str(positions), str(target)],
+            [sys.executable, "-m", "analysis.render", *map(str, files)],
             env={**os.environ, "MUJOCO_GL": backend, "PYOPENGL_PLATFORM": backend},
             cwd=Path(__file__).parents[2],
             capture_output=True,

@@ -1,5 +1,6 @@
 """How each kind of artifact is made, and whose code decides what is in it."""
 
+from orchestrator.builders.anatomy import ANATOMY_BUILDERS
 from orchestrator.builders.kitchen import KITCHEN_BUILDERS
 from orchestrator.builders.maze import MAZE_BUILDERS
 from orchestrator.builders.parts import PLANNERS, Builder
@@ -7,7 +8,7 @@ from orchestrator.builders.robosuite import ROBOSUITE_BUILDERS
 from orchestrator.builders.training import TRAINING_BUILDERS
 
 BUILDERS: dict[str, Builder] = (
-    TRAINING_BUILDERS | MAZE_BUILDERS | KITCHEN_BUILDERS | ROBOSUITE_BUILDERS
+    TRAINING_BUILDERS | MAZE_BUILDERS | KITCHEN_BUILDERS | ROBOSUITE_BUILDERS | ANATOMY_BUILDERS
 )
 
 # What decides a block's outcome beside the models: Algorithm 1 and the planners,

@@ -11,6 +11,7 @@ import torch
 from stitching.envs.protocol import Benchmark, EpisodeBlock
 from stitching.planning.objective import spread_over_members
 from stitching.rollout import Segments
+from stitching.showcase.scenery import SCENERIES, Scenery
 from stitching.showcase.shown import Shown
 
 EPISODES = 10  # played of the task, of which one is shown
@@ -27,7 +28,8 @@ class StepRecorder:
 
     benchmark: Benchmark
     shown: Shown
-    episodes: list[dict[str, list[Any]]] = field(init=False)
+    scenery: Scenery | None
+    episodes: list[dict[str, Any]] = field(init=False)
 
     def __post_init__(self) -> None:
         names = ("positions", "skill", "phase", "value", "spread")
@@ -39,8 +41,11 @@ class StepRecorder:
         values = self.shown.agent.values(torch.from_numpy(block.observe(rows)), skill)
         spread = spread_over_members(values)
         positions = cast(PhysicsBlock, block).positions(rows)
-        for row, at, mean, std in zip(episodes, positions, values.mean(dim=0), spread, strict=True):
-            episode = self.episodes[row]
+        told = zip(rows, episodes, positions, values.mean(dim=0), spread, strict=True)
+        for row, number, at, mean, std in told:
+            episode = self.episodes[number]
+            if self.scenery and "fixtures" not in episode:
+                episode["fixtures"] = self.scenery.fixtures(block, row)
             episode["positions"].append([round(x, 4) for x in at.tolist()])
             episode["skill"].append(self.benchmark.skills[skill].name)
             episode["phase"].append(phase)
@@ -54,10 +59,13 @@ def physics_showcase(benchmark: Benchmark, shown: Shown) -> dict[str, Any]:
     Shown is the first of ten episodes in which the last method accomplishes more than the first;
     if there is none, the first episode. Figures say so. The benchmark's blocks are `PhysicsBlock`s.
     """
+    scenery = SCENERIES.get(benchmark.name)
     played = {}
     for method in shown.stitchers:
-        recorder = StepRecorder(benchmark, shown)
+        recorder = StepRecorder(benchmark, shown, scenery)
         segments = shown.play(benchmark, method, EPISODES, recorder)
+        for episode, numbers in zip(recorder.episodes, _segment_numbers(segments), strict=True):
+            episode["segment"] = numbers
         played[method] = recorder.episodes, _accomplished(segments)
     scores = [accomplished for _, accomplished in played.values()]
     better = np.flatnonzero(scores[-1] > scores[0])
@@ -72,7 +80,19 @@ def physics_showcase(benchmark: Benchmark, shown: Shown) -> dict[str, Any]:
             {"method": method, "accomplished": int(accomplished[number]), **episodes[number]}
             for method, (episodes, accomplished) in played.items()
         ],
+        **({"model": scenery.model()} if scenery else {}),
     }
+
+
+def _segment_numbers(segments: list[Segments]) -> list[list[int]]:
+    """Which of the task's skills each step of each episode belongs to, from 0: one may recur."""
+    numbers: list[list[int]] = [[] for _ in range(EPISODES)]
+    episodes = np.arange(EPISODES)
+    for number, one in enumerate(segments):
+        for episode, steps in zip(episodes, one.steps, strict=True):
+            numbers[episode] += [number] * int(steps)
+        episodes = episodes[one.success]
+    return numbers
 
 
 def _accomplished(segments: list[Segments]) -> np.ndarray:

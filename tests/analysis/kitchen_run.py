@@ -68,6 +68,49 @@ def kitchen_episode(method: str, stitched: bool) -> dict[str, Any]:
     }
 
 
+def kitchen_stitch(episode: int, without: bool, stitched: bool, worth: float) -> dict[str, Any]:
+    """Two steps, each to gain 1; `worth` is what it did, and sets the variances and distances."""
+    doubt = 1 - worth
+    return {
+        "first": "microwave",
+        "second": "kettle",
+        "episode": episode,
+        "succeeds_without": without,
+        "succeeds_with": stitched,
+        "steps_without": 60,
+        "steps_with": 62,
+        "value": [-9.0, -9.0 + worth, -9.0 + 2 * worth],
+        "spread": [0.5] * 3,
+        "distance": [0.2, 0.2 + 0.1 * doubt, 0.2 + 0.2 * doubt],
+        "plans": [
+            {"step": step, "value": -8.0 + step * worth, "spread": 0.5 + doubt,
+             "disagreement": 0.1, "objective": -7.0}
+            for step in (0, 1)
+        ],
+    }  # fmt: skip
+
+
+def kitchen_anatomy() -> dict[str, Any]:
+    """Two stitches that helped, one that hurt, and one that had nothing to do."""
+    nothing = kitchen_stitch(3, True, True, 0.0)
+    for name in ("value", "spread", "distance"):
+        nothing[name] = nothing[name][:1]
+    return {
+        "episodes": 5,
+        "limit": 5,
+        "alpha": 7.0,
+        "beta": 5.0,
+        "typical_distance": {"kettle": 0.1, "light switch": None},
+        "pairs": [{"first": "microwave", "second": "kettle", "arrived": 4}],
+        "stitches": [
+            kitchen_stitch(0, False, True, 0.5),
+            kitchen_stitch(1, False, True, 1.0),
+            kitchen_stitch(2, True, False, -1.0),
+            nothing | {"plans": []},
+        ],
+    }
+
+
 def kitchen_files() -> dict[str, Any]:
     """Everything beside the segments, by the name of its JSON file."""
     curve = np.linspace(-5, 0, 21).tolist()
@@ -85,6 +128,7 @@ def kitchen_files() -> dict[str, Any]:
             "accomplished_by_all": {"no-stitch": [1] * 10, "mb-stitch": [1, 1, *[2] * 8]},
             "episodes": [kitchen_episode("no-stitch", False), kitchen_episode("mb-stitch", True)],
         },
+        "anatomy": kitchen_anatomy(),
         "diagnosis": {
             "predictions": {
                 steps: {

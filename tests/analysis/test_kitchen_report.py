@@ -9,12 +9,14 @@ import pandas as pd
 import pytest
 
 import analysis.figures
-from analysis.figures.frames import NoPictureError
+from analysis.figures.scenes import NoPictureError
 from analysis.report import build_report, export_results
 from tests.analysis.kitchen_run import write_kitchen
 
-STUDIES = {"pairs.csv", "pair-groups.csv", "models.csv"}
-KITCHEN_FIGURES = {"stitch-values", "contact-sheet", "pairs", "diagnosis", "diagnosis-values"}
+STUDIES = {"pairs.csv", "pair-groups.csv", "models.csv", "anatomy.csv", "stitches.csv"}
+KITCHEN_FIGURES = {
+    "stitch-values", "contact-sheet", "pairs", "diagnosis", "diagnosis-values", "anatomy",
+}  # fmt: skip
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -24,9 +26,9 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 @pytest.fixture(autouse=True)
 def _drawing_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Frames themselves are tested in test_kitchen_figures."""
+    """Frames themselves are tested in test_physics_figures."""
 
-    def frames(positions: np.ndarray) -> np.ndarray:
+    def frames(scene: dict[str, Any], positions: np.ndarray) -> np.ndarray:
         grey = np.linspace(0, 255, 12 * 16 * 3).reshape(12, 16, 3)
         return np.repeat(grey[None], len(positions), axis=0).astype(np.uint8)
 
@@ -47,6 +49,7 @@ def test_the_page_says_what_the_files_say(tmp_path: Path, write_run: Any) -> Non
     page = build_report(write_kitchen(write_run, tmp_path / "run")).read_text(encoding="utf-8")
     assert "Pairs of skills" in page
     assert "Are the models right?" in page
+    assert "When does stitching hurt?" in page
     assert "pairs in the data (3)" in page.replace("\N{NO-BREAK SPACE}", " ")
     assert "97 of 100" in page
     assert "Framed: pairs that occur in the data" in page
@@ -59,7 +62,7 @@ def test_the_page_says_what_the_files_say(tmp_path: Path, write_run: Any) -> Non
 def test_without_a_picture_the_report_is_written_and_says_why(
     tmp_path: Path, write_run: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def nothing(positions: np.ndarray) -> np.ndarray:
+    def nothing(scene: dict[str, Any], positions: np.ndarray) -> np.ndarray:
         raise NoPictureError("MuJoCo draws with nothing <here>; install libegl1 or libosmesa6")
 
     monkeypatch.setattr(analysis.figures, "render_frames", nothing)

@@ -78,6 +78,24 @@ def test_the_run_tells_of_pairs_and_models(played: tuple[Plan, Place]) -> None:
         assert (place.out / "report" / f"{table}.md").is_file()
 
 
+def test_stitches_are_taken_apart(played: tuple[Plan, Place]) -> None:
+    plan, place = played
+    anatomy = json.loads((place.out / "anatomy.json").read_text())
+    pairs = [(pair["first"], pair["second"]) for pair in anatomy["pairs"]]
+    assert pairs == list(dict.fromkeys(p for task in plan.spec.all_tasks for p in pairwise(task)))
+    assert anatomy["stitches"]
+    stitched = pd.read_parquet(place.out / "segments.parquet").query(
+        "depth == 2 and method == 'mb-stitch'"
+    )
+    played_there = stitched.set_index(["prefix", "episode"])
+    for stitch in anatomy["stitches"]:
+        place_in_tree = f"{stitch['first']}>{stitch['second']}", stitch["episode"]
+        if place_in_tree in played_there.index:
+            there = played_there.loc[place_in_tree]
+            assert stitch["succeeds_with"] == there["success"]
+            assert stitch["steps_with"] == there["steps"]
+
+
 def test_a_shown_episode_is_recorded_step_by_step(played: tuple[Plan, Place]) -> None:
     _, place = played
     showcase = json.loads((place.out / "showcase.json").read_text())

@@ -69,6 +69,24 @@ def test_more_held_out_data_retrain_nothing(spec: Spec, plan: Plan) -> None:
     assert more.illustrations["showcase"] == plan.illustrations["showcase"]
 
 
+def test_stitches_are_taken_apart_between_pairs_from_all_over_the_tasks(plan: Plan) -> None:
+    recipe = plan.recipes[plan.illustrations["anatomy"]]
+    pairs = [tuple(pair) for pair in recipe.params["pairs"]]
+    assert len(set(pairs)) == len(pairs) == 20
+    assert {first for first, _ in pairs} == {second for _, second in pairs} == set(SKILLS)
+    assert [method for method, _ in recipe.params["methods"]] == ["mb-stitch"]
+    models = {"agent": plan.agents[0], "dynamics": plan.dynamics[0]}
+    assert recipe.inputs == plan.datasets | models  # what distances are measured to
+    assert recipe.key not in plan.needed
+
+
+def test_few_pairs_are_all_taken_apart() -> None:
+    plan = make_plan(load_spec("table3-can", "quick"))
+    params = plan.recipes[plan.illustrations["anatomy"]].params
+    assert [tuple(pair) for pair in params["pairs"]] == [("can", "can")]
+    assert params["episodes"] == 30
+
+
 def test_other_sources_are_other_data_and_say_so(spec: Spec) -> None:
     single = replace(spec, data=KitchenDataConfig(source="single-skill"))
     assert list(make_plan(single).datasets) == [

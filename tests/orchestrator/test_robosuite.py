@@ -56,7 +56,16 @@ def test_a_task_from_data_to_report(
     assert len(episodes) == len(spec.methods) * spec.episodes
     diagnosis = json.loads((place.out / "diagnosis.json").read_text())
     assert set(diagnosis["competence"]) == set(spec.skill_names)
+    anatomy = json.loads((place.out / "anatomy.json").read_text())
+    assert [(pair["first"], pair["second"]) for pair in anatomy["pairs"]] == [task]
+    assert len(anatomy["stitches"]) == anatomy["pairs"][0]["arrived"]
     assert (place.out / "report" / f"{name}.md").is_file()
-    shown = json.loads((place.out / "showcase.json").read_text())["episodes"]
+    showcase = json.loads((place.out / "showcase.json").read_text())
+    shown = showcase["episodes"]
     assert [episode["method"] for episode in shown] == ["no-stitch", "mb-stitch"]
-    assert all(len(episode["positions"]) == len(episode["phase"]) > 0 for episode in shown)
+    for episode in shown:
+        lengths = {len(episode[name]) for name in ("positions", "phase", "segment")}
+        assert len(lengths) == 1
+        assert lengths != {0}
+        assert (list(episode["fixtures"]) == ["Door_main"]) == (name == "table3-door")
+    assert showcase["model"].startswith("<mujoco")

@@ -13,7 +13,7 @@ import pytest
 from orchestrator import worker
 from orchestrator.cli import main
 from orchestrator.errors import ChangedError, IncompleteError, LockedError, UsageError
-from orchestrator.merge import describe_suite
+from orchestrator.merge import Naming, anatomy_of_part, describe_suite, merge_again
 from orchestrator.progress import Silent
 from orchestrator.reproduce_suite import reproduce_suite
 from orchestrator.rundir import RunDirectory
@@ -166,6 +166,24 @@ def test_a_part_that_gives_up_blocks(
     with mock.patch("analysis.report.draw_figures", return_value=[]):
         carry_out(levels(), done)
     assert promised_bytes(done / "out") == promised_bytes(finished / "out")
+
+
+def test_stitches_taken_apart_are_kept_by_part(done: Path, tmp_path: Path) -> None:
+    """Under the names that skills have where all parts meet."""
+    study = {
+        "pairs": [{"first": "g0", "second": "g1", "arrived": 1}],
+        "stitches": [{"first": "g0", "second": "g1", "episode": 0}],
+        "typical_distance": {"g1": 0.1},
+    }
+    directory = RunDirectory(done / "out")
+    part_directory(directory, "level-2").write_json("anatomy.json", study)
+    merge_again(directory)
+    assert directory.read_json("anatomy.json") == {"parts": {"level-2": study}}
+    suite = lists(tmp_path)
+    renamed = anatomy_of_part(study, Naming(suite, suite.parts[0]))
+    assert renamed["pairs"] == [{"first": "short:g0", "second": "short:g1", "arrived": 1}]
+    assert renamed["stitches"][0]["second"] == "short:g1"
+    assert renamed["typical_distance"] == {"short:g1": 0.1}
 
 
 def test_refusals(done: Path) -> None:

@@ -1,4 +1,4 @@
-"""One Kitchen episode: its values step by step, and pictures of it."""
+"""One episode of simulated physics: its values step by step, and pictures of it."""
 
 from collections.abc import Mapping, Sequence
 from itertools import groupby
@@ -16,11 +16,11 @@ from analysis.run import SEPARATOR, RunSpec
 STITCH = "#E3001B"
 BANDS = [colour for colour in COLOURS if colour != "#D55E00"]  # too near to STITCH
 EQUAL_STEPS = 12  # frames of a sheet at equal steps
-APART = 3  # steps; nearer to a stitch's ends they show nothing new
+APART = 1 / 80  # of an episode; nearer to one another they show nothing new
 COLUMNS = 4
 
 Episode = Mapping[str, Any]
-"""Of one method, by step (T,): positions (T, 30), skill, phase, value, spread."""
+"""Of one method, by step (T,): positions (T, nq), skill, segment, phase, value, spread."""
 
 
 def stretches(labels: Sequence[Any]) -> list[tuple[Any, int, int]]:
@@ -31,26 +31,44 @@ def stretches(labels: Sequence[Any]) -> list[tuple[Any, int, int]]:
 
 def stitches(episode: Episode) -> list[tuple[int, int]]:
     """(first step, last step) of each stitch; of two in a row each by itself."""
-    steps = list(zip(episode["skill"], episode["phase"], strict=True))
+    steps = list(zip(segment_numbers(episode), episode["phase"], strict=True))
     return [(start, end) for (_, phase), start, end in stretches(steps) if phase == "stitch"]
+
+
+def segment_numbers(episode: Episode) -> list[int]:
+    """Which of the task's skills each step belongs to; in old recordings none is used twice."""
+    if "segment" in episode:
+        return list(episode["segment"])
+    runs = enumerate(stretches(episode["skill"]))
+    return [number for number, (_, start, end) in runs for _ in range(start, end + 1)]
+
+
+def segment_labels(showcase: Mapping[str, Any], spec: RunSpec) -> list[str]:
+    """The task's skills in words, numbered where one recurs."""
+    skills = showcase["task"].split(SEPARATOR)
+    return [
+        f"{spec.skill_label(skill)} {skills[: place + 1].count(skill)}"
+        if skills.count(skill) > 1
+        else spec.skill_label(skill)
+        for place, skill in enumerate(skills)
+    ]
 
 
 def draw_values(showcase: Mapping[str, Any], spec: RunSpec) -> Figure:
     """A panel for the first and the last method; a line breaks where another value takes over."""
     episodes = first_and_last(showcase)
-    skills = showcase["task"].split(SEPARATOR)
-    colours = dict(zip(skills, BANDS, strict=False))
+    labels = segment_labels(showcase, spec)
     figure = new_figure(8.5, 0.9 + 2.1 * len(episodes))
     panels = figure.subplots(len(episodes), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     for axes, episode in zip(panels, episodes, strict=True):
-        _draw_value(axes, episode, colours)
+        _draw_value(axes, episode)
         axes.set_title(_score(episode, showcase, spec), loc="left")
         axes.set_ylabel("value")
     panels[0].set_xlim(0, max(len(episode["value"]) for episode in episodes))
     panels[-1].set_xlabel("step")
     keys: list[Any] = [
-        Patch(color=colours[skill], alpha=0.5, lw=0, label=spec.skill_label(skill))
-        for skill in skills
+        Patch(color=colour, alpha=0.5, lw=0, label=label)
+        for colour, label in zip(BANDS, labels, strict=False)
     ]
     keys += [
         Patch(facecolor="white", edgecolor=STITCH, hatch="/////", lw=0, label="stitching"),
@@ -71,11 +89,11 @@ def _score(episode: Episode, showcase: Mapping[str, Any], spec: RunSpec) -> str:
     return f"{method}: {episode['accomplished']} of {len(showcase['task'].split(SEPARATOR))} skills"
 
 
-def _draw_value(axes: Axes, episode: Episode, colours: Mapping[str, str]) -> None:
+def _draw_value(axes: Axes, episode: Episode) -> None:
     value, spread = np.array(episode["value"]), np.array(episode["spread"])
-    for skill, start, end in stretches(episode["skill"]):
+    for number, start, end in stretches(segment_numbers(episode)):
         steps = np.arange(start, end + 1)
-        axes.axvspan(start, end + 1, color=colours[skill], alpha=0.22, lw=0)
+        axes.axvspan(start, end + 1, color=BANDS[number], alpha=0.22, lw=0)
         # A step is as wide as its band: its value stands in the middle.
         low, high = (value - spread)[steps], (value + spread)[steps]
         axes.fill_between(steps + 0.5, low, high, color=INK, alpha=0.25, lw=0)
@@ -89,16 +107,21 @@ def _draw_value(axes: Axes, episode: Episode, colours: Mapping[str, str]) -> Non
 
 
 def sheet_steps(episode: Episode) -> list[int]:
-    """Steps worth a picture: some at equal distances, and every stitch's first and last."""
+    """Steps worth a picture: every stitch's first and last, every skill's last, some between."""
     last = len(episode["phase"]) - 1
-    ends = {step for stitch in stitches(episode) for step in stitch}
+    shown = {step for stitch in stitches(episode) for step in stitch}
+    skill_ends = {end for _, _, end in stretches(segment_numbers(episode))}
     equal = np.linspace(0, last, min(EQUAL_STEPS, last + 1)).round().astype(int).tolist()
-    far = {step for step in equal if all(abs(step - end) > APART for end in ends)}
-    return sorted(ends | far)
+    for more in (skill_ends, set(equal)):
+        shown |= {step for step in more if all(abs(step - at) > APART * last for at in shown)}
+    return sorted(shown)
 
 
-def draw_sheet(episode: Episode, steps: Sequence[int], frames: np.ndarray, spec: RunSpec) -> Figure:
+def draw_sheet(
+    episode: Episode, steps: Sequence[int], frames: np.ndarray, labels: Sequence[str]
+) -> Figure:
     """frames: (N, height, width, 3), one for each of `steps`; stitching ones in a thick frame."""
+    numbers = segment_numbers(episode)
     columns = min(COLUMNS, len(steps))
     rows = -(-len(steps) // columns)
     _, height, width, _ = frames.shape
@@ -110,7 +133,7 @@ def draw_sheet(episode: Episode, steps: Sequence[int], frames: np.ndarray, spec:
         axes.set(xticks=[], yticks=[])
         axes.spines[:].set(visible=True, color=STITCH if stitching else FAINT)
         axes.spines[:].set_linewidth(4 if stitching else 0.6)
-        title = f"step {step}: {spec.skill_label(episode['skill'][step])}"
+        title = f"step {step}: {labels[numbers[step]]}"
         axes.set_title(
             f"{title}, stitch" if stitching else title,
             fontsize=9,
