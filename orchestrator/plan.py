@@ -49,6 +49,12 @@ class Plan:
     nodes: tuple[Node, ...]
 
     @cached_property
+    def scored_kinds(self) -> set[str]:
+        """Kinds of the artifacts that scores depend on, which illustrations are not among."""
+        models = (self.agents, self.dynamics, self.mf_policies, self.datasets)
+        return {self.recipes[key].kind for keys in models for key in keys.values()}
+
+    @cached_property
     def chunks(self) -> list[tuple[int, int]]:
         """Episode ranges of a node's blocks."""
         size, total = self.spec.block_episodes, self.spec.episodes

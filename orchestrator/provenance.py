@@ -6,6 +6,7 @@ import importlib.metadata
 import os
 import platform
 import subprocess
+from collections.abc import Iterable
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -28,9 +29,9 @@ REPORTED_PACKAGES = (
 SOURCES = ("stitching", "orchestrator", "sweeps", "analysis", "pyproject.toml", "constraints.txt")
 
 
-def matters() -> Plain:
-    """What must not change under a run: a change may change its numbers."""
-    parts = {kind: (builder.code, builder.setup) for kind, builder in BUILDERS.items()}
+def matters(kinds: Iterable[str]) -> Plain:
+    """What must not change under a run whose scores depend on artifacts of these kinds."""
+    parts = {kind: (BUILDERS[kind].code, BUILDERS[kind].setup) for kind in sorted(kinds)}
     parts["blocks"] = BLOCK_CODE, BLOCK_SETUP
     code = {f"code that makes {kind}": code_fingerprint(*of)[:12] for kind, of in parts.items()}
     packages = {name: importlib.metadata.version(name) for name in NUMERIC_PACKAGES}

@@ -10,6 +10,7 @@ from analysis.report import build_report
 from orchestrator.errors import IncompleteError, SkillstitchError
 from orchestrator.executors import open_executor
 from orchestrator.merge import describe_suite, write_merged
+from orchestrator.plan import make_plan
 from orchestrator.progress import Progress
 from orchestrator.reproduce import Settings, partial_error, reproduce, tracked
 from orchestrator.rundir import RunDirectory
@@ -27,7 +28,9 @@ def reproduce_suite(suite: Suite, settings: Settings, progress: Progress) -> Run
     directory, watch = RunDirectory(settings.out), Stopwatch()
     with directory.locked():
         run_id = directory.claim(
-            describe_suite(suite), lambda: suite_differences(suite_of(directory), suite)
+            describe_suite(suite),
+            set().union(*(make_plan(part.spec).scored_kinds for part in suite.parts)),
+            lambda: suite_differences(suite_of(directory), suite),
         )
         parts = {part.label: part_directory(directory, part.label) for part in suite.parts}
         done = directory.finished and all(part.finished for part in parts.values())

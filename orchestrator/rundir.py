@@ -8,7 +8,7 @@ import json
 import os
 import socket
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
@@ -18,6 +18,7 @@ from orchestrator.errors import ChangedError, LockedError, UsageError
 from orchestrator.kits import KITS
 from orchestrator.ledger import Ledger
 from orchestrator.methods import method_label
+from orchestrator.plan import make_plan
 from orchestrator.provenance import matters
 from orchestrator.spec import Spec, TableSpec, differences, spec_from_plain
 from orchestrator.store import storage_errors, write_atomically
@@ -97,23 +98,29 @@ class RunDirectory:
 
         Raises ChangedError naming what differs: a field, a package version, the code.
         """
-        return self.claim(describe(spec), lambda: differences(self.spec(), spec))
+        kinds = make_plan(spec).scored_kinds
+        return self.claim(describe(spec), kinds, lambda: differences(self.spec(), spec))
 
-    def claim(self, description: Plain, differing: Callable[[], list[str]]) -> str:
-        """As `settle`, for whatever is described; `differing` compares it with what is there."""
+    def claim(
+        self, description: Plain, kinds: Iterable[str], differing: Callable[[], list[str]]
+    ) -> str:
+        """As `settle`, for whatever is described; `differing` compares it with what is there.
+
+        Its scores depend on artifacts of these kinds.
+        """
         identity_path = self.path / "identity.json"
         if not identity_path.exists():
-            identity = {"run_id": uuid.uuid4().hex, "matters": matters()}
+            identity = {"run_id": uuid.uuid4().hex, "matters": matters(kinds)}
             self.write_json("spec.json", description)
             self.write_json("identity.json", identity)
             return str(identity["run_id"])
         identity = json.loads(identity_path.read_text())
         changed = differing()
-        before, now = identity["matters"], matters()
+        before, now = identity["matters"], matters(kinds)
         changed += [
-            f"{name}: {before.get(name)} → {now.get(name)}"
-            for name in sorted(before.keys() | now.keys())
-            if before.get(name) != now.get(name)
+            f"{name}: {before.get(name)} → {now[name]}"
+            for name in sorted(now)
+            if before.get(name) != now[name]
         ]
         if changed:
             raise ChangedError(

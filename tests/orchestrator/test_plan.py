@@ -133,3 +133,8 @@ def test_the_order_of_methods_does_not_choose_the_picture(spec: Spec) -> None:
 def test_the_registry_names_the_environments_that_data_are_made_in() -> None:
     """Whose code is in the datasets' names, and so in all that is learned from them."""
     assert {"maze": MAZE, "kitchen": KITCHEN}.items() <= BENCHMARKS.items()
+
+
+def test_no_score_depends_on_what_is_only_looked_at(plan: Plan) -> None:
+    made = {recipe.kind for recipe in plan.recipes.values()}
+    assert made - plan.scored_kinds == {"maze-showcase"}
