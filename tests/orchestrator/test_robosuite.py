@@ -24,7 +24,7 @@ def small(name: str) -> Spec:
     )  # fmt: skip
     return replace(
         spec,
-        data=replace(spec.data, level=4, episodes=6, held_out=2),
+        data=replace(spec.data, quality=1.0, episodes=6, held_out=2),
         agent=skills,
         dynamics=DynamicsConfig(updates=100, width=32, members=2, activation="sigmoid"),
         random_stitch=replace(spec.random_stitch, limit=2),

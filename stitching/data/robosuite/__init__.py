@@ -1,1 +1,1 @@
-"""Robosuite datasets: scripted demonstrations at four levels of quality."""
+"""Robosuite datasets: scripted demonstrations by hands of any quality."""

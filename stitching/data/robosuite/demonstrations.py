@@ -9,11 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
-from stitching.data.robosuite.programs import STYLES, Hand
+from stitching.data.robosuite.programs import Hand, style
 from stitching.data.transitions import DataError, Transitions
 from stitching.envs.protocol import skill_index
 from stitching.envs.robosuite.can import Can
@@ -23,7 +22,7 @@ from stitching.streams import stream
 
 @dataclass(frozen=True)
 class RobosuiteDataConfig:
-    level: Literal[1, 2, 3, 4] = 1  # of the hand: 1 is clumsy and often fails, 4 an expert
+    quality: float = 1.0  # of the hand: from 1, an expert, down to 0, who misses most of the time
     episodes: int = 100  # demonstrations a skill
     held_out: int = 30  # more of each skill, to judge models by
     skill_steps: int = 40  # actions after which a skill counts as missed
@@ -64,8 +63,8 @@ def demonstrate(
     labels = [("demonstrations", benchmark.name, seed, skill, int(number)) for number in numbers]
     block = starts(benchmark, index).block()
     block.reset([stream("environment", *label) for label in labels])
-    style = STYLES[config.level]
-    hands = [Hand(skill, benchmark.workspace, style, stream("hand", *label)) for label in labels]
+    manner = style(config.quality)
+    hands = [Hand(skill, benchmark.workspace, manner, stream("hand", *label)) for label in labels]
     rows = np.arange(len(hands))
     snapshots = block.snapshot(rows)
     seen = [[observation] for observation in block.observe(rows)]

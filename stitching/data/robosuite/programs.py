@@ -79,13 +79,14 @@ class Style:
     slip: float  # probability that an action is a random one
 
 
-# By level of quality, from a clumsy beginner to an expert.
-STYLES = {
-    1: Style(jitter=0.03, noise=0.08, slip=0.12),
-    2: Style(jitter=0.02, noise=0.05, slip=0.06),
-    3: Style(jitter=0.01, noise=0.025, slip=0.02),
-    4: Style(jitter=0.004, noise=0.01, slip=0.0),
-}
+def style(quality: float) -> Style:
+    """From a steady expert, 1, to a beginner who misses most of the time, 0."""
+    clumsy = 1 - quality
+    return Style(
+        jitter=0.004 + 0.026 * clumsy,
+        noise=0.01 + 0.07 * clumsy,
+        slip=0.12 * clumsy,
+    )
 
 
 def object_frame(skill: str, observation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
