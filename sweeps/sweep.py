@@ -71,6 +71,7 @@ def carry_out(
                 if sweep.tables:
                     with arena.quietly():
                         write_table(sweep, arena, directory.path / "table")
+                _write_counts(directory, arena.tally, earlier)
                 write_report(sweep, study, directory, results)
             finished = True
         finally:

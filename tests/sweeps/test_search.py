@@ -42,6 +42,21 @@ def test_no_first_skill_and_no_no_stitch_segment_is_played_again(done: Path) -> 
     assert set(found["blocks played"]) == {"mb-stitch"}
 
 
+def test_the_report_counts_what_the_confirmation_took(finished: Path) -> None:
+    played = counts(finished)["blocks played"]
+    report = (finished / "sweep" / "report" / "index.md").read_text()
+    assert "- blocks played: " + ", ".join(f"{kind} {n}" for kind, n in played.items()) in report
+
+
+def test_a_search_keeps_its_report(finished: Path) -> None:
+    kept = finished / "results" / tiny_sweep().name
+    assert {"index.md", "trials.csv", "confirm.csv", "provenance.json"} <= {
+        path.name for path in kept.iterdir()
+    }
+    report = finished / "sweep" / "report" / "index.md"
+    assert (kept / "index.md").read_bytes() == report.read_bytes()
+
+
 def test_every_block_is_played_once(trained: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     executor = Counted()
     monkeypatch.setattr("orchestrator.reproduce.open_executor", lambda *_: executor)

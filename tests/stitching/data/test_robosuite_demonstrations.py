@@ -1,6 +1,6 @@
 """Scripted robosuite hands: experts succeed, beginners often do not, and numbers decide it all."""
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 from functools import cache
 
 import numpy as np
@@ -12,31 +12,36 @@ from stitching.data.robosuite.demonstrations import (
     collect,
     demonstrate,
 )
-from stitching.data.robosuite.programs import PROGRAMS, STYLES, object_frame
+from stitching.data.robosuite.programs import PROGRAMS, object_frame, style
 from stitching.data.transitions import DataError, check
 from stitching.envs.robosuite.can import CAN, Can
 from stitching.envs.robosuite.door import DOOR, HANDLE_TURN, HINGE, OPEN, Door
 from stitching.streams import stream
 
 EPISODES = 5
+BEGINNER, EXPERT = 0.0, 1.0
 ROW = np.arange(1)
 BENCHMARK = {skill.name: benchmark for benchmark in (DOOR, CAN) for skill in benchmark.skills}
 
 
 @cache
-def shown(skill: str, level: int) -> list[Demonstration]:
-    config = RobosuiteDataConfig(episodes=EPISODES, level=level)
+def shown(skill: str, quality: float) -> list[Demonstration]:
+    config = RobosuiteDataConfig(episodes=EPISODES, quality=quality)
     return demonstrate(BENCHMARK[skill], config, skill, 0)
 
 
 def test_every_skill_has_a_program() -> None:
     assert set(PROGRAMS) == set(BENCHMARK)
-    assert sorted(STYLES) == [1, 2, 3, 4]
+
+
+def test_a_better_hand_is_steadier_in_every_way() -> None:
+    best, good, bad = (astuple(style(quality)) for quality in (1.0, 0.5, 0.0))
+    assert all(a < b < c for a, b, c in zip(best, good, bad, strict=True))
 
 
 @pytest.mark.parametrize("skill", PROGRAMS)
 def test_experts_succeed_within_half_a_task(skill: str) -> None:
-    demonstrations = shown(skill, 4)
+    demonstrations = shown(skill, EXPERT)
     limit = 25 if BENCHMARK[skill] is DOOR else 50  # half of the paper's, for two skills
     good = [one.success and len(one.actions) <= limit for one in demonstrations]
     assert np.mean(good) >= 0.8
@@ -45,16 +50,16 @@ def test_experts_succeed_within_half_a_task(skill: str) -> None:
 def test_beginners_often_fail() -> None:
     """Over all three skills: each alone is a handful of episodes."""
     rates = {
-        level: np.mean([one.success for skill in PROGRAMS for one in shown(skill, level)])
-        for level in (1, 4)
+        quality: np.mean([one.success for skill in PROGRAMS for one in shown(skill, quality)])
+        for quality in (BEGINNER, EXPERT)
     }
-    assert 0.1 < rates[1] < 0.7 < rates[4]
+    assert 0.1 < rates[BEGINNER] < 0.7 < rates[EXPERT]
 
 
 def test_an_episode_depends_on_its_own_number_alone() -> None:
-    config = RobosuiteDataConfig(episodes=EPISODES, level=1)
+    config = RobosuiteDataConfig(episodes=EPISODES, quality=BEGINNER)
     (alone,) = demonstrate(DOOR, config, "close door", 0, [3])
-    together = shown("close door", 1)[3]
+    together = shown("close door", BEGINNER)[3]
     assert alone.observations.tobytes() == together.observations.tobytes()
     assert alone.actions.tobytes() == together.actions.tobytes()
     (other,) = demonstrate(DOOR, config, "close door", 1, [3])
@@ -63,7 +68,7 @@ def test_an_episode_depends_on_its_own_number_alone() -> None:
 
 def test_closing_begins_at_an_open_door_and_opening_at_a_closed_one() -> None:
     hinges = {
-        skill: [one.observations[0, HINGE] for one in shown(skill, 4)]
+        skill: [one.observations[0, HINGE] for one in shown(skill, EXPERT)]
         for skill in ("open door", "close door")
     }
     assert max(hinges["open door"]) == 0
@@ -72,7 +77,7 @@ def test_closing_begins_at_an_open_door_and_opening_at_a_closed_one() -> None:
 
 def test_demonstrations_end_with_success() -> None:
     for skill in ("open door", "close door"):
-        for one in shown(skill, 4):
+        for one in shown(skill, EXPERT):
             hinges = one.observations[:, HINGE]
             there = hinges > 0.3 if skill == "open door" else hinges < 0.05
             assert there[-1] == one.success
@@ -97,7 +102,7 @@ def test_the_handles_frame_follows_the_door_and_not_the_handle() -> None:
 
 @pytest.mark.parametrize("benchmark", [DOOR, CAN], ids=lambda benchmark: benchmark.name)
 def test_a_collection_can_be_trained_on(benchmark: Door | Can) -> None:
-    config = RobosuiteDataConfig(episodes=3, level=3, skill_steps=18)
+    config = RobosuiteDataConfig(episodes=3, quality=0.65, skill_steps=18)
     data = collect(benchmark, config, 0)
     check(data, benchmark, "here")
     assert len(data.episode_ends) == 3 * len(benchmark.skills)
