@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 
+from threadpoolctl import threadpool_limits
+
 from orchestrator.jobs import BuildJob, Job, Report
 from orchestrator.store import Artifact
 from orchestrator.worker import BlockPlayer, build, use_one_thread
@@ -14,6 +16,8 @@ class SerialExecutor:
 
     def __init__(self) -> None:
         use_one_thread()
+        # Numpy's linear algebra has threads of its own, which wait for each other in busy loops.
+        threadpool_limits(1)
         self._player = BlockPlayer()
         self._artifacts: dict[str, Artifact] = {}
         self._jobs: deque[Job] = deque()
