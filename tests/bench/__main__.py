@@ -1,7 +1,7 @@
 """`make bench`: the ratios that the documentation quotes, each within one run.
 
-    python -m tests.bench [iql planner reference outside tree speedup scheduling]
-                          [--run DIR] [--json FILE]
+    python -m tests.bench [iql planner reference outside tree speedup scheduling
+                           robosuite] [--run DIR] [--json FILE]
 
 Read the ratios, not the numbers behind them, which belong to the machine.
 """
@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 import tyro
 
@@ -22,14 +22,17 @@ from tests.bench import (
     bench_iql,
     bench_planner,
     bench_reference_planner,
+    bench_robosuite,
     bench_run,
     bench_scheduling,
     bench_speedup,
 )
 from tests.bench.result import HEADER, Result
 
-Name = Literal["iql", "planner", "reference", "outside", "tree", "speedup", "scheduling"]
-ALL: tuple[Name, ...] = ("iql", "planner", "reference", "outside", "tree", "speedup", "scheduling")
+Name = Literal[
+    "iql", "planner", "reference", "outside", "tree", "speedup", "scheduling", "robosuite"
+]
+ALL: tuple[Name, ...] = get_args(Name)
 
 
 def main(
@@ -53,6 +56,7 @@ def main(
         "tree": partial(bench_run.tree, run),
         "speedup": bench_speedup.measure,
         "scheduling": bench_scheduling.measure,
+        "robosuite": bench_robosuite.measure,
     }
     use_one_thread()
     results = []

@@ -1,6 +1,6 @@
 """Robosuite actions a second: a block of episodes against robosuite's plain `env.step`.
 
-    python -m tests.bench.bench_robosuite [episodes]
+    python -m tests.bench robosuite
 
 Both do the same motions, the whole task from its start, in as many control steps; they take turns,
 an episode of theirs and a block of ours. Ours is all that a rollout asks of it: observe, step,
@@ -9,7 +9,6 @@ achieved. Seconds are of the CPU and per episode. Robosuite's is its own step an
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from statistics import median
 from time import process_time
@@ -19,7 +18,7 @@ import numpy as np
 from stitching.envs.robosuite.can import CAN, Can
 from stitching.envs.robosuite.door import DOOR, Door
 from stitching.streams import stream
-from tests.bench.result import HEADER, Result
+from tests.bench.result import Result
 from tests.stitching.envs.robosuite_original import Original, path_actions
 
 ROUNDS = 5
@@ -73,13 +72,3 @@ def measure(episodes: int = 10) -> Iterator[Result]:
         ratio = median(one / other for other, one in pairs)
         what = f"{benchmark.name} actions a second, {episodes} episodes, to env.step's"
         yield Result("robosuite", what, numbers, ratio, at_least=2.5)
-
-
-def main() -> None:
-    print(HEADER)
-    for result in measure(*[int(argument) for argument in sys.argv[1:2]]):
-        print(result.lines())
-
-
-if __name__ == "__main__":
-    main()
