@@ -142,7 +142,10 @@ def _which_episode(run: Run) -> str:
     better = sum(b > a for a, b in zip(*scores, strict=True))
     played = f"{run.spec.task_label(showcase['task'])}, {showcase['of_episodes']} episodes played"
     if not better:
-        return f"{played}: {last} accomplishes more than {first} in none; the first is shown."
+        return (
+            f"{played}: {last} accomplishes more than {first} in none; shown is the first in which "
+            "it accomplishes most."
+        )
     return f"{played}: {last} accomplishes more than {first} in {better}; the first of them."
 
 
