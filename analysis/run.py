@@ -153,7 +153,7 @@ class Run:
     provenance: dict[str, Any]
     quarantine: list[dict[str, Any]]
     training: list[dict[str, Any]]
-    showcase: dict[str, Any]
+    showcases: dict[str, Any]  # by part, as `anatomy`
     datasets: list[dict[str, Any]]
     diagnosis: dict[str, Any]
     anatomy: dict[str, Any]  # by part, of a merged run; else by "" alone
@@ -176,7 +176,7 @@ def load_run(run_dir: Path) -> Run:
         provenance=_read_json(run_dir / "provenance.json", {}),
         quarantine=_read_json(run_dir / "quarantine.json", []),
         training=_read_json(run_dir / "training.json", []),
-        showcase=_read_json(run_dir / "showcase.json", {}),
+        showcases=_by_part(_read_json(run_dir / "showcase.json", {})),
         datasets=_read_json(run_dir / "datasets.json", []),
         diagnosis=_read_json(run_dir / "diagnosis.json", {}),
         anatomy=_by_part(_read_json(run_dir / "anatomy.json", {})),

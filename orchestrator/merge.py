@@ -153,10 +153,11 @@ def write_merged(suite: Suite, directory: RunDirectory, run_id: str) -> None:
     directory.write_json("quarantine.json", gathered("quarantine.json", _given_up))
     directory.write_json("training.json", gathered("training.json", _trained))
     directory.write_json("datasets.json", gathered("datasets.json", _dataset))
-    anatomies = {label: part.read_json("anatomy.json") for label, part in there.items()}
-    parts = {label: anatomy_of_part(one, named[label]) for label, one in anatomies.items() if one}
-    if parts:
-        directory.write_json("anatomy.json", {"parts": parts})
+    for name, of_part in (("anatomy.json", anatomy_of_part), ("showcase.json", showcase_of_part)):
+        found = {label: part.read_json(name) for label, part in there.items()}
+        parts = {label: of_part(one, named[label]) for label, one in found.items() if one}
+        if parts:
+            directory.write_json(name, {"parts": parts})
     made = {label: part.read_json("provenance.json") for label, part in there.items()}
     directory.write_json("provenance.json", _provenance(made) | {"run_id": run_id})
 
@@ -205,6 +206,22 @@ def anatomy_of_part(study: Plain, naming: Naming) -> Plain:
         "pairs": [renamed(pair) for pair in study["pairs"]],
         "stitches": [renamed(stitch) for stitch in study["stitches"]],
         "typical_distance": {naming.skill(skill): distance for skill, distance in typical},
+    }
+
+
+def showcase_of_part(showcase: Plain, naming: Naming) -> Plain:
+    """What a part shows, under the names of the whole; a maze's has its goals' own on its map."""
+    renamed = showcase | {
+        "episodes": [e | {"method": naming.method(e["method"])} for e in showcase["episodes"]]
+    }
+    if "accomplished_by_all" not in showcase:
+        return renamed
+    for episode in renamed["episodes"]:
+        episode["skill"] = [naming.skill(skill) for skill in episode["skill"]]
+    counts = showcase["accomplished_by_all"].items()
+    return renamed | {
+        "task": naming.prefix(showcase["task"]),
+        "accomplished_by_all": {naming.method(method): each for method, each in counts},
     }
 
 

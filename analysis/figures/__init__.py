@@ -1,38 +1,20 @@
 """All figures of a run, drawn without a display and with reproducible bytes."""
 
-from dataclasses import dataclass
 from pathlib import Path
-
-import numpy as np
 
 from analysis.anatomy import begun
 from analysis.figures.anatomy import draw_anatomy
 from analysis.figures.curves import draw_curves
 from analysis.figures.diagnosis import draw_predictions, draw_value_curves
-from analysis.figures.frames import render_frames
-from analysis.figures.maze import draw_showcase
+from analysis.figures.drawn import Drawn
 from analysis.figures.pairs import draw_pairs
-from analysis.figures.physics import draw_sheet, draw_values, segment_labels, sheet_steps
-from analysis.figures.scenes import VIEWS, NoPictureError, scene_of
 from analysis.figures.scores import draw_scores
+from analysis.figures.showcases import draw_showcases
 from analysis.figures.style import house_style, save
 from analysis.pairs import shown_orders, shown_pairs
 from analysis.run import Run
 from analysis.tables import Table
 from analysis.writers import seed_note
-
-
-@dataclass(frozen=True)
-class Drawn:
-    """A figure on disk: <name>.svg and <name>.png, and what it shows, in words.
-
-    Where it could not be drawn `missing` says why, and there are no files.
-    """
-
-    name: str
-    caption: str
-    table: str  # id of the table it belongs to, "" if to the whole run
-    missing: str = ""
 
 
 def draw_figures(run: Run, tables: list[Table], folder: Path) -> list[Drawn]:
@@ -48,9 +30,7 @@ def draw_figures(run: Run, tables: list[Table], folder: Path) -> list[Drawn]:
                 f"{seed_note(table.fewest_seeds)}"
             )
             drawn.append(Drawn(name, caption, table.entry.id))
-        if run.showcase:
-            benchmark = run.showcase.get("benchmark", "maze")
-            drawn += SHOWCASES.get(benchmark, _physics_showcase)(run, folder)
+        drawn += draw_showcases(run, folder)
         pair = _first_and_last_method(run)
         if pair:
             shown = shown_pairs(shown_orders(run.datasets) or [])
@@ -67,23 +47,10 @@ def draw_figures(run: Run, tables: list[Table], folder: Path) -> list[Drawn]:
     return drawn
 
 
-SHOWCASE_CAPTION = (
-    "As Figure 1 of the paper: demonstrated skills (left), then whole episodes, the skill in "
-    "charge by colour, stitching dashed. Paths are drawn a little apart."
-)
 PAIRS_CAPTION = (
     "How often the second skill succeeds once the first has, by ordered pair, over all seeds."
 )
 FRAMED = " Framed: pairs that occur in the data, one right after the other."
-VALUES_CAPTION = (
-    "The same episode by both methods: the value of the skill in charge (background), ensemble "
-    "mean ± spread over its members. The line breaks where the next skill's value takes over; "
-    "stitching is hatched and red."
-)
-SHEET_CAPTION = (
-    "The episode above under {method}: frames at equal steps, every skill's last step, and every "
-    "stitch's first and last step, framed in red."
-)
 PREDICTIONS_CAPTION = (
     "Predictions of the dynamics on held-out demonstrations. Left: root mean square error over "
     "the distance moved; 1 (dashed) is no better than predicting that nothing moves. Right: the "
@@ -105,51 +72,6 @@ ANATOMY_CAPTION = (
     "predicted; and how much the value members and the dynamics members disagreed about the state "
     "predicted, on average over the stitch: the two variances that Eq. 2 subtracts."
 )
-
-
-def _maze_showcase(run: Run, folder: Path) -> list[Drawn]:
-    save(draw_showcase(run.showcase, run.spec.methods), folder, "showcase")
-    return [Drawn("showcase", SHOWCASE_CAPTION, "")]
-
-
-def _physics_showcase(run: Run, folder: Path) -> list[Drawn]:
-    save(draw_values(run.showcase, run.spec), folder, "stitch-values")
-    values = Drawn("stitch-values", f"{VALUES_CAPTION} {_which_episode(run)}", "")
-    return [values, _contact_sheet(run, folder)]
-
-
-def _contact_sheet(run: Run, folder: Path) -> Drawn:
-    showcase, episode = run.showcase, run.showcase["episodes"][-1]
-    steps = sheet_steps(episode)
-    try:
-        scene = scene_of(showcase, episode)
-        frames = render_frames(scene, np.array(episode["positions"])[steps])
-    except NoPictureError as error:
-        return Drawn("contact-sheet", "", "", f"no contact sheet: {error}")
-    sheet = draw_sheet(episode, steps, frames, segment_labels(showcase, run.spec))
-    save(sheet, folder, "contact-sheet", image_dpi=144)
-    method = run.spec.methods.get(episode["method"], episode["method"])
-    note = VIEWS[showcase["benchmark"]].note
-    return Drawn("contact-sheet", f"{SHEET_CAPTION.format(method=method)} {note}".strip(), "")
-
-
-def _which_episode(run: Run) -> str:
-    """How the shown episode was chosen, as `stitching.showcase.physics` does."""
-    showcase = run.showcase
-    names = [episode["method"] for episode in showcase["episodes"]]
-    first, last = (run.spec.methods.get(name, name) for name in (names[0], names[-1]))
-    scores = [showcase["accomplished_by_all"][name] for name in (names[0], names[-1])]
-    better = sum(b > a for a, b in zip(*scores, strict=True))
-    played = f"{run.spec.task_label(showcase['task'])}, {showcase['of_episodes']} episodes played"
-    if not better:
-        return (
-            f"{played}: {last} accomplishes more than {first} in none; shown is the first in which "
-            "it accomplishes most."
-        )
-    return f"{played}: {last} accomplishes more than {first} in {better}; the first of them."
-
-
-SHOWCASES = {"maze": _maze_showcase}  # all others: physics
 
 
 def _diagnosis(run: Run, folder: Path) -> list[Drawn]:

@@ -13,7 +13,13 @@ import pytest
 from orchestrator import worker
 from orchestrator.cli import main
 from orchestrator.errors import ChangedError, IncompleteError, LockedError, UsageError
-from orchestrator.merge import Naming, anatomy_of_part, describe_suite, merge_again
+from orchestrator.merge import (
+    Naming,
+    anatomy_of_part,
+    describe_suite,
+    merge_again,
+    showcase_of_part,
+)
 from orchestrator.progress import Silent
 from orchestrator.reproduce_suite import reproduce_suite
 from orchestrator.rundir import RunDirectory
@@ -184,6 +190,23 @@ def test_stitches_taken_apart_are_kept_by_part(done: Path, tmp_path: Path) -> No
     assert renamed["pairs"] == [{"first": "short:g0", "second": "short:g1", "arrived": 1}]
     assert renamed["stitches"][0]["second"] == "short:g1"
     assert renamed["typical_distance"] == {"short:g1": 0.1}
+
+
+def test_every_part_is_shown_under_the_names_of_the_whole(done: Path, tmp_path: Path) -> None:
+    shown = RunDirectory(done / "out").read_json("showcase.json")["parts"]
+    assert list(shown) == ["level-1", "level-2"]
+    methods = [episode["method"] for episode in shown["level-2"]["episodes"]]
+    assert methods == ["no-stitch@level-2", "mb-stitch@level-2"]
+    physical = {
+        "task": "g0>g1",
+        "accomplished_by_all": {"mb-stitch": [2]},
+        "episodes": [{"method": "mb-stitch", "skill": ["g0", "g1"]}],
+    }
+    suite = lists(tmp_path)
+    renamed = showcase_of_part(physical, Naming(suite, suite.parts[0]))
+    assert renamed["task"] == "short:g0>short:g1"
+    assert renamed["episodes"][0]["skill"] == ["short:g0", "short:g1"]
+    assert physical["episodes"][0]["skill"] == ["g0", "g1"], "it was changed in place"
 
 
 def test_refusals(done: Path) -> None:
