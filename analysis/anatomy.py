@@ -118,7 +118,7 @@ def _gained(study: Mapping[str, Any]) -> dict[str, float]:
         "plans": len(frame),
         "predicted_gain": frame["predicted"].mean(),
         "realised_gain": frame["realised"].mean(),
-        "rank_correlation": frame["predicted"].corr(frame["realised"], method="spearman"),
+        "rank_correlation": frame["predicted"].rank().corr(frame["realised"].rank()),
     }
 
 
