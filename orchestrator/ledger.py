@@ -16,6 +16,7 @@ from orchestrator.errors import IncompleteError, NondeterminismError, StorageErr
 from orchestrator.store import storage_errors
 
 SCHEMA = """
+BEGIN;
 CREATE TABLE IF NOT EXISTS blocks (
     key TEXT PRIMARY KEY, digest TEXT NOT NULL, outcome BLOB NOT NULL
 ) WITHOUT ROWID;
@@ -29,6 +30,7 @@ CREATE TABLE IF NOT EXISTS played (
     name TEXT PRIMARY KEY, segments INTEGER NOT NULL, successes INTEGER NOT NULL,
     seconds REAL NOT NULL
 ) WITHOUT ROWID;
+COMMIT;
 """
 
 
@@ -88,6 +90,10 @@ class Ledger:
         with self._storage_errors():
             if read_only:
                 self._db = sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=30)
+                if not self._has_tables():  # its writer was killed before it had made them
+                    self._db.close()
+                    self._db = sqlite3.connect(":memory:")
+                    self._db.executescript(SCHEMA + "PRAGMA query_only = 1;")
                 return
             with storage_errors(path):
                 path.parent.mkdir(parents=True, exist_ok=True)
@@ -95,6 +101,10 @@ class Ledger:
             self._db.execute("PRAGMA journal_mode=WAL")
             self._db.execute("PRAGMA synchronous=FULL")
             self._db.executescript(SCHEMA)
+
+    def _has_tables(self) -> bool:
+        (count,) = self._db.execute("SELECT COUNT(*) FROM sqlite_master").fetchone()
+        return bool(count)
 
     @classmethod
     def look(cls, path: Path) -> Ledger:

@@ -33,6 +33,7 @@ from sweeps.spec import MAXIMISED, SweepSpec, base_spec
 
 RESULT = "result"  # user attribute: a trial's metrics, there before any of its batch is told
 JOURNAL = "study.journal"
+STALE_SECONDS = 3  # an append takes milliseconds: a lock held for longer was left by a kill
 
 
 def repair(path: Path) -> int:
@@ -73,7 +74,8 @@ class SweepStudy:
         self.path = (folder / JOURNAL).resolve()
         self.cut = repair(self.path)
         optuna.logging.set_verbosity(logging.WARNING)
-        backend = JournalFileBackend(str(self.path), JournalFileOpenLock(str(self.path)))
+        lock = JournalFileOpenLock(str(self.path), grace_period=STALE_SECONDS)
+        backend = JournalFileBackend(str(self.path), lock)
         with storage_errors(self.path):
             self.study = _open(JournalStorage(backend), sweep)
 

@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from orchestrator import ledger as ledgers
 from orchestrator.errors import IncompleteError, NondeterminismError, StorageError
-from orchestrator.ledger import Ledger, Outcome, Played
+from orchestrator.ledger import SCHEMA, Ledger, Outcome, Played
 
 
 @pytest.fixture
@@ -122,6 +123,27 @@ def test_a_reader_makes_no_ledger(tmp_path: Path) -> None:
     with pytest.raises(StorageError, match=re.escape(str(tmp_path / "none.sqlite"))):
         Ledger(tmp_path / "none.sqlite", read_only=True)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_writer_killed_before_it_had_made_the_tables(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Readers find nothing played; the next writer goes on."""
+    path = tmp_path / "ledger.sqlite"
+    with monkeypatch.context() as killed:
+        killed.setattr(ledgers, "SCHEMA", SCHEMA.replace("COMMIT;", "killed"))
+        with pytest.raises(StorageError):
+            Ledger(path)
+    assert path.is_file()
+    for reader in (Ledger(path, read_only=True), Ledger.look(path)):
+        assert reader.finished() == reader.artifacts() == set()
+        assert reader.history() == reader.failures() == {}
+        with pytest.raises(StorageError):
+            reader.record([("a", b"one")])
+        reader.close()
+    writer = Ledger(path)
+    writer.record([("a", b"one")])
+    assert Ledger.look(path).finished() == {"a"}
 
 
 def test_artifacts_keep_their_first_digest(ledger: Ledger) -> None:

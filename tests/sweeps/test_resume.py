@@ -95,10 +95,12 @@ def test_killed_five_times_for_good(trained: Path, expected: dict[str, Any]) -> 
     command = [sys.executable, "-m", "orchestrator.cli", "sweep", TINY_SWEEP, *places, *how]
     for kill in range(1, 6):
         lines = journal_lines(trained)
-        process = subprocess.Popen(list(map(str, command)), stderr=subprocess.DEVNULL)
+        said = trained / f"said-{kill}.txt"
+        with said.open("w") as stream:
+            process = subprocess.Popen(list(map(str, command)), stderr=stream)
         while journal_lines(trained) < lines + 1 + kill % 2 and process.poll() is None:
             time.sleep(0.01)
-        assert process.poll() is None, "it was to be killed in the middle"
+        assert process.poll() is None, f"it was to be killed in the middle:\n{said.read_text()}"
         os.kill(process.pid, signal.SIGKILL)
         process.wait()
     sweep_in(trained, SWEEP)
@@ -119,6 +121,7 @@ def test_a_torn_line_is_cut_and_nothing_is_lost(done: Path, expected: dict[str, 
 def test_a_journal_torn_anywhere_ends_the_same(done: Path, expected: dict[str, Any]) -> None:
     path = done / "sweep" / JOURNAL
     path.write_bytes(path.read_bytes()[:-1000])
+    path.with_name(f"{JOURNAL}.lock").touch()  # Optuna's own, as a kill leaves it
     sweep_in(done, SWEEP)
     assert promised(done, SWEEP) == expected
 
