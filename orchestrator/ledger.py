@@ -89,11 +89,13 @@ class Ledger:
         self.path = path
         with self._storage_errors():
             if read_only:
-                self._db = sqlite3.connect(f"file:{path}?mode=ro", uri=True, timeout=30)
-                if not self._has_tables():  # its writer was killed before it had made them
+                # Not mode=ro: what a killed writer left half-done may have to be rolled back first.
+                self._db = sqlite3.connect(f"file:{path}?mode=rw", uri=True, timeout=30)
+                if not self._has_tables():  # it was killed before it had made them
                     self._db.close()
                     self._db = sqlite3.connect(":memory:")
-                    self._db.executescript(SCHEMA + "PRAGMA query_only = 1;")
+                    self._db.executescript(SCHEMA)
+                self._db.execute("PRAGMA query_only = 1")
                 return
             with storage_errors(path):
                 path.parent.mkdir(parents=True, exist_ok=True)

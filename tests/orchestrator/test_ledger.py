@@ -125,6 +125,27 @@ def test_a_reader_makes_no_ledger(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_reader_of_what_a_writer_left_half_done(tmp_path: Path) -> None:
+    """A rollback journal, as lies there when a kill comes before the ledger is in WAL mode."""
+    path = tmp_path / "ledger.sqlite"
+    script = (
+        "import os, signal, sqlite3, sys\n"
+        "db = sqlite3.connect(sys.argv[1], isolation_level=None)\n"
+        "db.execute('CREATE TABLE other (x)')\n"
+        "db.executescript('PRAGMA cache_size = 1; BEGIN; ' + "
+        "'INSERT INTO other VALUES (randomblob(5000));' * 50)\n"
+        "os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    killed = subprocess.run([sys.executable, "-c", script, str(path)], check=False)
+    assert killed.returncode == -signal.SIGKILL
+    assert path.with_name("ledger.sqlite-journal").stat().st_size > 0
+    reader = sqlite3.connect(f"file:{path}?mode=ro", uri=True)
+    with pytest.raises(sqlite3.OperationalError):
+        reader.execute("SELECT * FROM other")
+    reader.close()
+    Ledger(path, read_only=True).close()
+
+
 def test_a_writer_killed_before_it_had_made_the_tables(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
