@@ -143,9 +143,9 @@ def _gain_pairs(cells: Cells, entry: TableEntry) -> list[tuple[str, str, str]]:
 
 
 def _lead_pairs(scores: pd.DataFrame) -> list[tuple[str, str, str]]:
-    """(row, the paper's leader, the best of the others here); rows the paper ties are left out."""
+    """(row, the paper's leader, the best here of its others); rows the paper ties are left out."""
     pairs = []
-    for row, part in scores.groupby("row", sort=False):
+    for row, part in scores.dropna(subset="paper_score").groupby("row", sort=False):
         printed = part["paper_score"]
         leaders = part.loc[printed == printed.max(), "method"].tolist()
         others = part[~part["method"].isin(leaders)].dropna(subset="score")

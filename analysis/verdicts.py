@@ -90,7 +90,7 @@ def _leads(table: Table) -> list[Claim]:
             verdict = _side(lead["ci_low"], lead["ci_high"])
             detail = (
                 f"{lead['gain']:+.3f} [{lead['ci_low']:+.3f}, {lead['ci_high']:+.3f}] over "
-                f"{rival}, the best other method here "
+                f"{rival}, the best here of the paper's others "
                 f"({_seeds(lead['seeds'])}, {lead['pairs']:,} paired episodes)"
             )
         text = f"{leader} leads “{lead['row']}”"

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from stitching.models.dynamics import Dynamics
 from stitching.planning.objective import NORMS, spread_over_members
 from stitching.planning.protocol import Plan, Planner, Score
 from stitching.rollout import Play, Recorder, RolloutConfig, Segments, begin, play_segment
-from stitching.stitchers import MBStitch, NoStitch, Stitcher
+from stitching.stitchers import MBStitch, NoStitch, Proposal, Stitcher
 
 SAMPLED_STATES = 200  # of a skill's demonstrations, to say how near to one another they are
 DIGITS = 5  # after the point, of what is recorded
@@ -166,11 +167,12 @@ class Witness:
         previous: int,
         following: int,
         streams: Sequence[np.random.Generator],
-    ) -> np.ndarray:
-        actions = self._stitcher.propose(states, previous, following, streams)
+    ) -> Proposal:
+        proposal = self._stitcher.propose(states, previous, following, streams)
         assert self._planner.last is not None
-        self._expected = self.foresee(states, following, self._planner.last)
-        return actions
+        expected = self.foresee(states, following, self._planner.last)
+        self._expected = list(compress(expected, proposal.wanted))
+        return proposal
 
     def foresee(self, states: Tensor, following: int, plan: Plan) -> list[Numbers]:
         """The three terms of Eq. 2 one action ahead, unweighted, and Eq. 2 at the plan's end.

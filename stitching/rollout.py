@@ -144,27 +144,27 @@ def _stitch(
     value_start: np.ndarray,
     value: Callable[[np.ndarray, int], np.ndarray],
 ) -> None:
-    """Stitching phase: until the next skill's value no longer rises, or the limit."""
+    """Stitching phase: until the stitcher wants no more, the next skill's value no longer rises,
+    or the limit."""
     streams = play.streams("planner", by_method=True)
     values = value_start.copy()
     rows = progress.open(np.arange(len(values)))
     while len(rows):
-        actions = stitcher.propose(
+        proposal = stitcher.propose(
             torch.from_numpy(progress.block.observe(rows)),
             previous,
             progress.skill,
             [streams[row] for row in rows],
         )
-        moving, sequences = rows, actions
-        for step in range(actions.shape[1]):
-            progress.step(moving, sequences[:, step], "stitch")
-            still = progress.open(moving)
-            still = still[progress.steps[still] < stitcher.limit]
-            sequences = sequences[np.isin(moving, still)]
-            moving = still
-            if not len(moving):
+        rows, sequences = rows[proposal.wanted], proposal.actions[proposal.wanted]
+        for step in range(sequences.shape[1]):
+            if not len(rows):
                 break
-        rows = moving
+            progress.step(rows, sequences[:, step], "stitch")
+            still = progress.open(rows)
+            still = still[progress.steps[still] < stitcher.limit]
+            sequences = sequences[np.isin(rows, still)]
+            rows = still
         new_values = value(rows, progress.skill)
         rising = new_values > values[rows]
         values[rows] = new_values

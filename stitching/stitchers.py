@@ -18,8 +18,21 @@ from stitching.planning.objective import Norm, conservative_value
 from stitching.planning.protocol import Planner, Score
 
 
+@dataclass(frozen=True)
+class Proposal:
+    """What a stitcher would do from n states."""
+
+    actions: np.ndarray  # (n, steps, action) float32, steps ≥ 1
+    wanted: np.ndarray  # (n,) bool; where False the stitch ends here, untaken if it had not begun
+
+    @classmethod
+    def of(cls, actions: np.ndarray) -> Proposal:
+        """Actions that are all to be taken."""
+        return cls(actions, np.ones(len(actions), dtype=bool))
+
+
 class Stitcher(Protocol):
-    """Chooses the actions between two skills."""
+    """Chooses the actions between two skills, and whether there are to be any."""
 
     @property
     def limit(self) -> int:
@@ -32,10 +45,10 @@ class Stitcher(Protocol):
         previous: int,
         following: int,
         streams: Sequence[np.random.Generator],
-    ) -> np.ndarray:
+    ) -> Proposal:
         """Actions to execute before the value is looked at again.
 
-        states (n, observation) and one stream per row → (n, steps, action) float32, steps ≥ 1.
+        For states (n, observation), with one stream each.
         """
 
 
@@ -51,7 +64,7 @@ class NoStitch:
         previous: int,
         following: int,
         streams: Sequence[np.random.Generator],
-    ) -> np.ndarray:
+    ) -> Proposal:
         raise AssertionError("No-Stitch takes no stitching steps")
 
 
@@ -68,8 +81,8 @@ class RandomStitch:
         previous: int,
         following: int,
         streams: Sequence[np.random.Generator],
-    ) -> np.ndarray:
-        return np.stack([self.actions.uniform(rng, (1,)) for rng in streams])
+    ) -> Proposal:
+        return Proposal.of(np.stack([self.actions.uniform(rng, (1,)) for rng in streams]))
 
 
 @dataclass(frozen=True)
@@ -86,8 +99,9 @@ class MFStitch:
         previous: int,
         following: int,
         streams: Sequence[np.random.Generator],
-    ) -> np.ndarray:
-        return self.policy.act(states, self.pairs[previous, following], noise=None)[:, None]
+    ) -> Proposal:
+        actions = self.policy.act(states, self.pairs[previous, following], noise=None)
+        return Proposal.of(actions[:, None])
 
 
 @dataclass(frozen=True)
@@ -103,6 +117,7 @@ class MBStitch:
     norm: Norm
     execute: int  # actions of each plan that are carried out: all in the maze, 1 under CEM
     limit: int
+    selective: bool = False  # act only on plans that promise more than the state they start from
 
     @cached_property
     def _critic(self) -> Agent:
@@ -115,9 +130,17 @@ class MBStitch:
         previous: int,
         following: int,
         streams: Sequence[np.random.Generator],
-    ) -> np.ndarray:
+    ) -> Proposal:
         plan = self.planner.plan(self.score(states, following), streams, self.actions)
-        return plan.actions[:, : self.execute].numpy()
+        actions = plan.actions[:, : self.execute].numpy()
+        if not self.selective:
+            return Proposal.of(actions)
+        return Proposal(actions, (plan.objective > self.present(states, following)).numpy())
+
+    def present(self, states: Tensor, following: int) -> Tensor:
+        """Eq. 2 of states themselves, (n, observation) → (n,): nothing there is predicted."""
+        values = self._critic.values(states, following)
+        return conservative_value(values, states[None], self.alpha, self.beta, self.norm)
 
     def score(self, states: Tensor, following: int) -> Score:
         """Eq. 2 at the end of each imagined action sequence, every member on its own path."""

@@ -18,7 +18,7 @@ import numpy as np
 from stitching.envs.protocol import EpisodeBlock
 from stitching.envs.robosuite.can import CAN
 from stitching.envs.robosuite.door import DOOR
-from stitching.envs.robosuite.models import UNUSED, original
+from stitching.envs.robosuite.models import composed, original
 
 PACKAGE = "robosuite"  # whose folder has the meshes and textures
 
@@ -30,7 +30,7 @@ class Scenery:
 
     def model(self) -> str:
         """The model as XML, files relative to their package's folder."""
-        return composed(self.task)
+        return portable(self.task)
 
     def fixtures(self, block: EpisodeBlock, row: int) -> dict[str, list[float]]:
         """Poses of bodies that are the model's and differ by episode."""
@@ -46,15 +46,9 @@ SCENERIES = {DOOR.name: Scenery("Door", "Door_main"), CAN.name: Scenery("PickPla
 
 
 @cache
-def composed(task: str) -> str:
+def portable(task: str) -> str:
     """What `arm_model` compiles, as text that means the same on another machine."""
-    env = original(task)
-    tree = ElementTree.fromstring(env.edit_model_xml(env.model.get_xml()))
-    world = tree.find("worldbody")
-    assert world is not None
-    for body in world.findall("body"):
-        if body.attrib["name"].startswith(UNUSED):
-            world.remove(body)
+    tree = composed(original(task))
     folder = _package_folder()
     for asset in tree.iterfind("asset/*[@file]"):
         asset.attrib["file"] = Path(normpath(asset.attrib["file"])).relative_to(folder).as_posix()

@@ -61,6 +61,17 @@ def test_leads_hold_the_papers_leader_against_the_best_other(table: Table) -> No
         assert lead["baseline"] == others.loc[others["score"].idxmax(), "method"]
 
 
+def test_the_papers_leader_is_not_held_against_what_the_paper_has_not(
+    episodes: pd.DataFrame, spec: RunSpec, table: Table
+) -> None:
+    """A method of ours that wins everywhere is no rival in a claim of the paper's."""
+    ours = "mb-stitch[selective=true]"
+    winning = episodes.query("method == 'mb-stitch'").assign(method=ours, score=1.0)
+    more = replace(spec, methods={**spec.methods, ours: "MB-Stitch [selective=true]"})
+    leads = build_table(pd.concat([episodes, winning]), more, spec.tables[0]).leads
+    assert leads["baseline"].tolist() == table.leads["baseline"].tolist()
+
+
 def test_missing_episodes_are_counted(episodes: pd.DataFrame, spec: RunSpec) -> None:
     short = episodes.query("not (method == 'mf-stitch' and length == 3 and episode > 7)")
     table = build_table(short, spec, spec.tables[0])

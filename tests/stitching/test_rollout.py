@@ -28,7 +28,7 @@ from stitching.rollout import (
     play_from_start,
     play_segment,
 )
-from stitching.stitchers import NoStitch, RandomStitch, Stitcher
+from stitching.stitchers import NoStitch, Proposal, RandomStitch, Stitcher
 
 SAMPLED, MODE = RolloutConfig(sample_actions=True), RolloutConfig()
 STEP_LIMIT = 40
@@ -460,9 +460,9 @@ class PlannerRecorder:
         previous: int,
         following: int,
         streams: Sequence[np.random.Generator],
-    ) -> np.ndarray:
+    ) -> Proposal:
         self.drawn.extend(stream.bytes(16) for stream in streams)
-        return np.eye(4, dtype=np.float32)[np.zeros((len(streams), 1), dtype=int)]
+        return Proposal.of(np.eye(4, dtype=np.float32)[np.zeros((len(streams), 1), dtype=int)])
 
 
 def test_stitchers_draw_from_the_planner_streams_of_their_method(maze: Maze, agent: Agent) -> None:
@@ -514,7 +514,8 @@ def walker(
 
 @dataclass(frozen=True)
 class Signposts:
-    """In each row of the floor, the moves to make from there, whatever the column."""
+    """In each row of the floor, the moves to make from there, whatever the column; where there
+    are none, the stitch is not wanted."""
 
     signs: dict[int, list[int]]
     limit: int
@@ -526,12 +527,14 @@ class Signposts:
         previous: int,
         following: int,
         streams: Sequence[np.random.Generator],
-    ) -> np.ndarray:
+    ) -> Proposal:
         assert (previous, following) == (HOME, CORNER) or following == NORTH
         assert len(states) == len(streams)
         self.asked.append(len(states))
         rows = np.rint(states[:, 0].numpy() * SIDE).astype(int)
-        return np.eye(4, dtype=np.float32)[[self.signs[row] for row in rows.tolist()]]
+        steps = len(next(iter(self.signs.values())))
+        signs = [self.signs.get(row, [UP] * steps) for row in rows.tolist()]
+        return Proposal(np.eye(4, dtype=np.float32)[signs], np.isin(rows, list(self.signs)))
 
 
 def on_the_floor(
@@ -567,6 +570,19 @@ def test_a_stitch_ends_when_the_value_no_longer_rises() -> None:
     np.testing.assert_allclose(outcome.value_start, [-4, -5, -8, -9, -10], rtol=1e-5)
     np.testing.assert_allclose(outcome.value_end, [-4, -4, -4, -10, -10], rtol=1e-5)
     assert stitcher.asked == [5, 3, 1, 1, 1]
+
+
+def test_a_stitch_that_is_not_wanted_takes_no_step() -> None:
+    """V rises to the north. There is no sign in rows 7 and 9: one has not begun, one has."""
+    stitcher = Signposts({row: [UP] for row in (8, 10)}, limit=20)
+    outcome, log = on_the_floor(walker(v_row=[-1.0]), stitcher, [(7, 2), (8, 2), (9, 2), (10, 2)])
+    assert outcome.stitch_steps.tolist() == [0, 1, 0, 1]
+    assert stitcher.asked == [4, 2]
+    assert outcome.value_start[0] == outcome.value_end[0]
+    assert [log.path(row)[0] for row in range(4)] == [(7, 3), (7, 2), (9, 3), (9, 2)]
+    untouched, alone = on_the_floor(walker(v_row=[-1.0]), NoStitch(), [(7, 2)])
+    assert log.path(0) == alone.path(0)
+    assert outcome.steps[0] == untouched.steps[0]
 
 
 def test_a_stitch_ends_at_its_limit() -> None:

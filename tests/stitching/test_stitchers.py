@@ -51,7 +51,7 @@ def test_proposals_are_actions(
 ) -> None:
     stitcher = stitchers[method]
     for n in (1, len(states)):
-        actions = stitcher.propose(states[:n], 0, 1, streams(n))
+        actions = stitcher.propose(states[:n], 0, 1, streams(n)).actions
         steps = 4 if method == "mb-stitch" else 1
         assert actions.shape == (n, steps, MOVES.size)
         assert actions.dtype == np.float32
@@ -64,11 +64,11 @@ def test_a_proposal_belongs_to_its_stream_and_state(
     method: str, stitchers: dict[str, Stitcher], states: torch.Tensor
 ) -> None:
     stitcher, n = stitchers[method], len(states)
-    together = stitcher.propose(states, 0, 1, streams(n))
+    together = stitcher.propose(states, 0, 1, streams(n)).actions
     torch.manual_seed(0)
-    assert np.array_equal(stitcher.propose(states, 0, 1, streams(n)), together)
+    assert np.array_equal(stitcher.propose(states, 0, 1, streams(n)).actions, together)
     for row in range(n):
-        alone = stitcher.propose(states[row : row + 1], 0, 1, [streams(n)[row]])
+        alone = stitcher.propose(states[row : row + 1], 0, 1, [streams(n)[row]]).actions
         assert np.array_equal(alone[0], together[row])
 
 
@@ -77,7 +77,7 @@ def test_other_streams_bring_other_proposals(
     method: str, stitchers: dict[str, Stitcher], states: torch.Tensor
 ) -> None:
     same = states[:1].expand(40, -1)
-    proposals = stitchers[method].propose(same, 0, 1, streams(40))
+    proposals = stitchers[method].propose(same, 0, 1, streams(40)).actions
     assert len(np.unique(proposals, axis=0)) > 1
 
 
@@ -86,7 +86,7 @@ def test_streams_go_on_from_call_to_call(
     method: str, stitchers: dict[str, Stitcher], states: torch.Tensor
 ) -> None:
     same, generators = states[:1].expand(40, -1), streams(40)
-    first, second = (stitchers[method].propose(same, 0, 1, generators) for _ in range(2))
+    first, second = (stitchers[method].propose(same, 0, 1, generators).actions for _ in range(2))
     assert not np.array_equal(first, second)
 
 
@@ -101,14 +101,14 @@ def test_no_stitch_takes_no_step() -> None:
 
 def test_random_stitch_is_uniform_whatever_the_state() -> None:
     stitcher = RandomStitch(MOVES, limit=5)
-    actions = stitcher.propose(torch.zeros(4000, 6), 0, 1, streams(4000))
+    actions = stitcher.propose(torch.zeros(4000, 6), 0, 1, streams(4000)).actions
     np.testing.assert_allclose(actions.mean(axis=(0, 1)), 0.25, atol=0.03)
-    elsewhere = stitcher.propose(torch.ones(4000, 6), 2, 3, streams(4000))
+    elsewhere = stitcher.propose(torch.ones(4000, 6), 2, 3, streams(4000)).actions
     assert np.array_equal(elsewhere, actions)
 
 
 def test_random_stitch_fills_the_box() -> None:
-    actions = RandomStitch(ARM, limit=5).propose(torch.zeros(2000, 6), 0, 1, streams(2000))
+    actions = RandomStitch(ARM, limit=5).propose(torch.zeros(2000, 6), 0, 1, streams(2000)).actions
     assert actions.shape == (2000, 1, 2)
     assert np.abs(actions).max() <= 1
     np.testing.assert_allclose(
@@ -143,7 +143,7 @@ def test_mf_stitch_asks_its_policy_about_the_ordered_pair() -> None:
     pairs = {pair: row for row, pair in enumerate(skill_pairs(4))}
     stitcher = MFStitch(policy, pairs, limit=5)
     for previous, following in permutations(range(4), 2):
-        actions = stitcher.propose(torch.zeros(10, 6), previous, following, streams(10))
+        actions = stitcher.propose(torch.zeros(10, 6), previous, following, streams(10)).actions
         assert (actions.argmax(axis=2) == following).all()
 
 
@@ -151,7 +151,7 @@ def test_mf_stitch_plays_its_policys_mode() -> None:
     likes = np.log([0.1, 0.2, 0.4, 0.3])
     policy = linear_agent(np.zeros((1, 2)), np.stack([0 * likes, likes]), np.ones((1, 1)), MOVES)
     stitcher = MFStitch(policy, {(0, 1): 0}, limit=5)
-    actions = stitcher.propose(torch.zeros(50, 1), 0, 1, streams(50))
+    actions = stitcher.propose(torch.zeros(50, 1), 0, 1, streams(50)).actions
     assert (actions.argmax(axis=2) == 2).all()
 
 
@@ -258,7 +258,7 @@ def test_the_score_is_equation_2(space: ActionSpace, norm: Norm, horizon: int, s
 def test_the_best_of_all_sequences_is_proposed(alpha: float, beta: float) -> None:
     """Sixteen sequences of two moves, of which 300 samples miss none."""
     stitcher, states = mb_stitch(MOVES, alpha=alpha, beta=beta), planned_from(6)
-    proposed = stitcher.propose(torch.from_numpy(states), 0, 1, streams(6)).argmax(axis=2)
+    proposed = stitcher.propose(torch.from_numpy(states), 0, 1, streams(6)).actions.argmax(axis=2)
     for state, moves in zip(states, proposed, strict=True):
         scores = {
             pair: equation_2(*random_models(MOVES), state, np.eye(4)[list(pair)], 1, stitcher)
@@ -271,15 +271,15 @@ def test_the_best_of_all_sequences_is_proposed(alpha: float, beta: float) -> Non
 def test_as_much_of_the_plan_is_proposed_as_is_to_be_executed(execute: int) -> None:
     stitcher, states = mb_stitch(ARM, execute=execute), torch.from_numpy(planned_from())
     plan = stitcher.planner.plan(stitcher.score(states, 1), streams(4), ARM)
-    proposed = stitcher.propose(states, 0, 1, streams(4))
+    proposed = stitcher.propose(states, 0, 1, streams(4)).actions
     assert proposed.shape == (4, execute, 2)
     assert np.array_equal(proposed, plan.actions[:, :execute])
 
 
 def test_the_previous_skill_does_not_matter_to_mb_stitch() -> None:
     stitcher, states = mb_stitch(MOVES), torch.from_numpy(planned_from())
-    from_first = stitcher.propose(states, 0, 1, streams(4))
-    assert np.array_equal(stitcher.propose(states, 1, 1, streams(4)), from_first)
+    from_first = stitcher.propose(states, 0, 1, streams(4)).actions
+    assert np.array_equal(stitcher.propose(states, 1, 1, streams(4)).actions, from_first)
 
 
 @pytest.mark.parametrize("copies", [1, 3])
@@ -322,7 +322,7 @@ SURE = [[1.0, 0.0], [0.0, 1.0]]
 
 
 @pytest.mark.parametrize(
-    ("values", "steps", "settings", "wanted"),
+    ("values", "steps", "settings", "moves"),
     [
         ([[1, -1], [1, -1]], [SURE, SURE], {}, (1, -1)),
         # Mean V is x − y, but the members disagree about x.
@@ -335,8 +335,37 @@ SURE = [[1.0, 0.0], [0.0, 1.0]]
     ids=["value alone", "α = 0", "α = 5", "β = 5", "β = 0"],
 )
 def test_doubt_steers_the_plan(
-    values: list, steps: list, settings: dict[str, float], wanted: tuple[float, float]
+    values: list, steps: list, settings: dict[str, float], moves: tuple[float, float]
 ) -> None:
     stitcher = line_stitcher(values, steps, **settings)
-    proposed = stitcher.propose(torch.zeros(3, 2), 0, 0, streams(3))
-    np.testing.assert_allclose(proposed, np.broadcast_to(wanted, (3, 1, 2)), atol=0.05)
+    proposed = stitcher.propose(torch.zeros(3, 2), 0, 0, streams(3)).actions
+    np.testing.assert_allclose(proposed, np.broadcast_to(moves, (3, 1, 2)), atol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("values", "settings", "wanted"),
+    [
+        ([[1, -1], [1, -1]], {}, True),
+        ([[0, 0]], {}, False),  # nothing is better than what is
+        # The members of V agree at zero and nowhere else.
+        ([[3, 0], [1, 0]], {"alpha": 1.0}, True),
+        ([[3, 0], [1, 0]], {"alpha": 3.0}, False),
+    ],
+    ids=["rises", "flat", "α = 1", "α = 3"],
+)
+def test_a_selective_stitch_wants_plans_that_beat_the_present(
+    values: list, settings: dict[str, float], wanted: bool
+) -> None:
+    always = line_stitcher(values, [SURE, SURE], **settings)
+    proposal = replace(always, selective=True).propose(torch.zeros(3, 2), 0, 0, streams(3))
+    assert proposal.wanted.tolist() == [wanted] * 3
+    usual = always.propose(torch.zeros(3, 2), 0, 0, streams(3))
+    assert usual.wanted.all()
+    assert np.array_equal(usual.actions, proposal.actions)
+
+
+def test_the_present_is_equation_2_without_a_prediction() -> None:
+    stitcher, states = mb_stitch(ARM, alpha=2.0, beta=7.0), torch.from_numpy(planned_from())
+    values = stitcher.agent.values(states, 1)
+    expected = values.mean(dim=0) - 2 * values.std(dim=0, correction=0)
+    np.testing.assert_allclose(stitcher.present(states, 1), expected, atol=1e-5)

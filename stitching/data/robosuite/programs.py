@@ -30,9 +30,14 @@ class Waypoint:
     least: int = 1  # actions, even if it is there at once: fingers need two to close
     world: bool = False  # `at` is a place in the world
     loose: float = 1.0  # how freely a hand would vary it, against its jitter
+    holding: float = np.inf  # m, from the gripper to the object; if it is farther, it was missed
 
 
 W = Waypoint
+
+# A hand takes hold as soon as the object is between its fingers (m), and goes nowhere without it
+# (m): what it shows follows from what it sees, or else nobody could learn it.
+BETWEEN, HELD = 0.025, 0.05
 
 
 def _door(pull: float) -> tuple[Waypoint, ...]:
@@ -46,7 +51,7 @@ def _door(pull: float) -> tuple[Waypoint, ...]:
     return (
         W((0.0, 0.2, 0.03), OPEN, near=0.05, patience=4),  # the hand swings round to face the door
         W((0.0, 0.1, 0.0), OPEN, near=0.03, patience=4),
-        W((0.0, 0.0, 0.0), OPEN, near=0.012, loose=0.4),
+        W((0.0, 0.0, 0.0), OPEN, near=BETWEEN, patience=8, loose=0.4),
         W((0.0, 0.0, 0.0), CLOSED, least=2, loose=0.4),
         *turning,
         W((x, pull, z), CLOSED, angles[-1], near=0.0, patience=6, loose=0.4),
@@ -58,10 +63,10 @@ PROGRAMS: dict[str, tuple[Waypoint, ...]] = {
     "close door": _door(-0.06),
     "can": (
         W((0.0, 0.0, 0.1), OPEN, near=0.03, patience=8),
-        W((0.0, 0.0, 0.0), OPEN, near=0.012, loose=0.4),
+        W((0.0, 0.0, 0.0), OPEN, near=BETWEEN, patience=8, loose=0.4),
         W((0.0, 0.0, 0.0), CLOSED, least=2, loose=0.4),
-        W((0.0, 0.0, 0.12), CLOSED, near=0.0, patience=1),
-        W((0.2, 0.4, 1.02), CLOSED, near=0.03, patience=8, world=True),
+        W((0.0, 0.0, 0.12), CLOSED, near=0.0, patience=1, holding=HELD),
+        W((0.2, 0.4, 1.02), CLOSED, near=0.06, patience=8, world=True, holding=HELD),
         W((0.2, 0.4, 1.0), OPEN, least=2, world=True, near=0.05),
     ),
 }
@@ -117,6 +122,8 @@ class Hand:
 
     def act(self, observation: np.ndarray) -> np.ndarray:
         """The next action (5,) float32 for an observation (25,)."""
+        if self._todo and self._lost(observation):
+            self._todo = []
         while self._todo and self._passed(observation):
             self._todo.pop(0)
             self._tried = 0
@@ -145,6 +152,11 @@ class Hand:
         gap = np.linalg.norm(self._place(observation) - observation[GRIP_POSITION])
         enough = self._tried >= waypoint.least
         return enough and bool(gap < waypoint.near or self._tried >= waypoint.patience)
+
+    def _lost(self, observation: np.ndarray) -> bool:
+        origin, _ = object_frame(self._skill, observation)
+        gap = np.linalg.norm(origin - observation[GRIP_POSITION])
+        return bool(gap > self._todo[0][0].holding)
 
     def _begin(self) -> None:
         waypoints = PROGRAMS[self._skill]

@@ -57,18 +57,23 @@ def original(task: str, **options: Any) -> Any:
         logging.disable(before)
 
 
-@cache
-def arm_model(task: str) -> ArmModel:
-    """For reading, and for MjData of one's own; objects without a joint may be moved about."""
-    env = original(task)
-    theirs = env.sim.model._model
+def composed(env: Any) -> ElementTree.Element:
+    """The model of robosuite's environment as XML, files by their paths here, less the UNUSED."""
     tree = ElementTree.fromstring(env.edit_model_xml(env.model.get_xml()))
     world = tree.find("worldbody")
     assert world is not None
     for body in world.findall("body"):
         if body.attrib["name"].startswith(UNUSED):
             world.remove(body)
-    model = mujoco.MjModel.from_xml_string(ElementTree.tostring(tree, encoding="unicode"))
+    return tree
+
+
+@cache
+def arm_model(task: str) -> ArmModel:
+    """For reading, and for MjData of one's own; objects without a joint may be moved about."""
+    env = original(task)
+    theirs = env.sim.model._model
+    model = mujoco.MjModel.from_xml_string(ElementTree.tostring(composed(env), encoding="unicode"))
     # The solver stops by a tolerance relative to these two's product: the same as theirs.
     model.stat.meaninertia = theirs.stat.meaninertia * theirs.nv / model.nv
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
