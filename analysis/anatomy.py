@@ -114,11 +114,13 @@ def _gained(study: Mapping[str, Any]) -> dict[str, float]:
     """Of all plans' first actions."""
     pairs = np.concatenate([np.empty((0, 2)), *(gains(stitch) for stitch in begun(study))])
     frame = pd.DataFrame(pairs, columns=["predicted", "realised"])
+    with np.errstate(invalid="ignore"):  # where one of them is constant there is none: NaN
+        correlation = frame["predicted"].rank().corr(frame["realised"].rank())
     return {
         "plans": len(frame),
         "predicted_gain": frame["predicted"].mean(),
         "realised_gain": frame["realised"].mean(),
-        "rank_correlation": frame["predicted"].rank().corr(frame["realised"].rank()),
+        "rank_correlation": correlation,
     }
 
 

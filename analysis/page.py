@@ -152,10 +152,12 @@ def _figure(figure: Drawn, folder: Path) -> str:
     if figure.missing:
         return f'<p class="note">{escape(figure.missing)}</p>'
     # As an image of its own, an SVG's element ids cannot clash with another's.
-    data = base64.b64encode((folder / f"{figure.name}.svg").read_bytes()).decode("ascii")
+    file = folder / figure.files[0]
+    data = base64.b64encode(file.read_bytes()).decode("ascii")
+    kind = "svg+xml" if file.suffix == ".svg" else "png"
     caption = escape(figure.caption)
     return (
-        f'<figure><img src="data:image/svg+xml;base64,{data}" alt="{caption}">'
+        f'<figure><img src="data:image/{kind};base64,{data}" alt="{caption}">'
         f"<figcaption>{caption}</figcaption></figure>"
     )
 

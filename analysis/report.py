@@ -65,10 +65,9 @@ def _copy_table(
         shutil.copyfile(report / source, folder / target)
     (folder / "figures").mkdir()
     for figure in drawn:
-        if figure.table in ("", name) and not figure.missing:
-            for suffix in ("svg", "png"):
-                file = f"figures/{figure.name}.{suffix}"
-                shutil.copyfile(report / file, folder / file)
+        if figure.table in ("", name):
+            for file in figure.files:
+                shutil.copyfile(report / "figures" / file, folder / "figures" / file)
 
 
 def _build(run_dir: Path) -> tuple[list[Table], Studies, list[Drawn]]:

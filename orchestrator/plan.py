@@ -170,7 +170,7 @@ def make_plan(spec: Spec) -> Plan:
 def _illustrated(spec: Spec, illustration: Illustration) -> Plain:
     """Parameters of an illustration; one that plays a task does so by No- and MB-Stitch.
 
-    One that takes stitches apart is told of the first MB-Stitch only: it knows what No-Stitch is.
+    Of several MB-Stitches, the first. One that takes stitches apart knows what No-Stitch is.
     """
     params: Plain = {
         "configs": {"dynamics": to_plain(spec.dynamics)},
@@ -179,9 +179,10 @@ def _illustrated(spec: Spec, illustration: Illustration) -> Plain:
         "root_seed": spec.root_seed,
         "seed": 0,
     }
+    ours = _settings(spec, "mb-stitch")[:1]
     if illustration.pairs:
         return params | {
-            "methods": _settings(spec, "mb-stitch")[:1],
+            "methods": ours,
             "pairs": _spread_out(_neighbours(spec), illustration.pairs),
             "episodes": min(illustration.episodes, spec.episodes),
         }
@@ -190,7 +191,7 @@ def _illustrated(spec: Spec, illustration: Illustration) -> Plain:
         return params | {"horizon": spec.mb_stitch.horizon}
     return params | {
         # Whatever their order in the spec.
-        "methods": _settings(spec, "no-stitch") + _settings(spec, "mb-stitch"),
+        "methods": _settings(spec, "no-stitch") + ours,
         "task": task if task in spec.all_tasks else max(spec.all_tasks, key=len),
     }
 

@@ -1,12 +1,12 @@
 """The task that a run shows, as pictures: what happened in an episode, and what it was worth."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from analysis.figures.drawn import Drawn
+from analysis.figures.drawn import PHOTOGRAPH, Drawn
 from analysis.figures.frames import render_frames
 from analysis.figures.maze import draw_showcase
 from analysis.figures.physics import draw_sheet, draw_values, segment_labels, sheet_steps
@@ -74,10 +74,10 @@ def _contact_sheet(shown: _Shown, folder: Path) -> Drawn:
     except NoPictureError as error:
         return shown.drawn("contact-sheet", "", f"no contact sheet: {error}")
     sheet = draw_sheet(episode, steps, frames, segment_labels(showcase, shown.spec))
-    save(sheet, folder, shown.name("contact-sheet"), image_dpi=144)
+    save(sheet, folder, shown.name("contact-sheet"), PHOTOGRAPH)
     method = shown.spec.methods.get(episode["method"], episode["method"])
     caption = f"{SHEET_CAPTION.format(method=method)} {VIEWS[showcase['benchmark']].note}"
-    return shown.drawn("contact-sheet", caption.strip())
+    return replace(shown.drawn("contact-sheet", caption.strip()), formats=PHOTOGRAPH)
 
 
 def _which_episode(shown: _Shown) -> str:

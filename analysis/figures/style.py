@@ -8,6 +8,8 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
+from analysis.figures.drawn import DRAWING
+
 # Okabe and Ito's palette, told apart by colour-blind readers; black and yellow left out.
 COLOURS = ["#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#7F7F7F"]
 MARKERS = ["o", "s", "^", "D", "v", "P", "X", "<", ">", "*"]
@@ -31,6 +33,12 @@ SETTINGS: dict[Any, Any] = {
 }
 
 
+OPTIONS: dict[str, dict[str, Any]] = {
+    "svg": {"dpi": 100, "metadata": {"Date": None, "Creator": None}},
+    "png": {"dpi": 144, "metadata": {"Software": None}},
+}
+
+
 @contextmanager
 def house_style() -> Iterator[None]:
     """Inside, matplotlib draws as configured here, whatever the user's own settings are."""
@@ -45,12 +53,8 @@ def new_figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def save(figure: Figure, folder: Path, name: str, image_dpi: int = 100) -> None:
-    """Writes <name>.svg and <name>.png; the same figure gives the same bytes.
-
-    `image_dpi` is the resolution of pictures inside the SVG.
-    """
+def save(figure: Figure, folder: Path, name: str, formats: tuple[str, ...] = DRAWING) -> None:
+    """Writes <name>.<format> for each; the same figure gives the same bytes."""
     folder.mkdir(parents=True, exist_ok=True)
-    metadata = {"Date": None, "Creator": None}
-    figure.savefig(folder / f"{name}.svg", dpi=image_dpi, metadata=metadata)
-    figure.savefig(folder / f"{name}.png", dpi=144, metadata={"Software": None})
+    for each in formats:
+        figure.savefig(folder / f"{name}.{each}", **OPTIONS[each])

@@ -41,7 +41,11 @@ def test_the_same_run_gives_the_same_bytes(tmp_path: Path, write_run: Any) -> No
     kept = contents(tmp_path / "results-a")
     assert kept == contents(tmp_path / "results-b")
     assert {f"table2/{study}" for study in STUDIES} <= set(kept)
-    assert {f"table2/figures/{name}.svg" for name in KITCHEN_FIGURES} <= set(kept)
+    assert {f"table2/figures/{name}.png" for name in KITCHEN_FIGURES} <= set(kept)
+    drawings = KITCHEN_FIGURES - {"contact-sheet"}  # it is a photograph
+    vectors = {name for name in kept if name.endswith(".svg")}
+    assert {f"table2/figures/{name}.svg" for name in drawings} <= vectors
+    assert "table2/figures/contact-sheet.svg" not in vectors
 
 
 def test_the_page_says_what_the_files_say(tmp_path: Path, write_run: Any) -> None:
