@@ -49,7 +49,7 @@ def gains(stitch: Stitch) -> np.ndarray:
 
 
 def begun(study: Mapping[str, Any]) -> list[Stitch]:
-    """Stitches of at least one step; others had their goal already, or no step left."""
+    """Stitches of at least one step; others had their goal, no step left, or were declined."""
     return [stitch for stitch in study["stitches"] if stitch["plans"]]
 
 

@@ -28,7 +28,7 @@ class Table:
     entry: TableEntry
     scores: pd.DataFrame  # SCORE_COLUMNS, one row a cell
     gains: pd.DataFrame  # GAIN_COLUMNS
-    leads: pd.DataFrame  # GAIN_COLUMNS: the paper's leader of each row over the best other here
+    leads: pd.DataFrame  # GAIN_COLUMNS: the paper's leader of each row over its best other
     expected: dict[tuple[str, str], int]  # (row, method) -> episodes of a complete cell
     labels: dict[str, str]  # method -> how the table's head calls it
 

@@ -79,7 +79,7 @@ class Played:
 
 
 class Ledger:
-    """Truth about what was simulated. The driver alone writes.
+    """Truth about what was simulated. The driver alone adds to it.
 
     A run directory has one; the store keeps another with every block that any run ever finished,
     so that a run finds what an earlier one has already played.

@@ -44,7 +44,7 @@ class MBStitchConfig:
     alpha: float = 1.0  # α of Eq. 2, price of the value ensemble's disagreement
     beta: float = 1.0  # β of Eq. 2, price of the dynamics ensemble's disagreement
     norm: Norm = "mean"  # how Eq. 2's second variance becomes a number
-    selective: bool = False  # act only on plans that promise more than the present; not the paper's
+    selective: bool = False  # act only on plans that promise more than the present
     planner: Literal["random-shooting", "cem"] = "cem"
     random_shooting: RandomShooting = RandomShooting()
     cem: CEM = CEM()

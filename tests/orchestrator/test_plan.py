@@ -123,7 +123,10 @@ def test_settings_in_a_methods_name_are_settings(spec: Spec) -> None:
 def test_the_order_of_methods_does_not_choose_the_picture(spec: Spec) -> None:
     one, other = (
         make_plan(replace(spec, methods=methods))
-        for methods in (("no-stitch", "mb-stitch"), ("mb-stitch", "no-stitch"))
+        for methods in (
+            ("no-stitch", "mb-stitch"),
+            ("mb-stitch", "mb-stitch[selective=true]", "no-stitch"),
+        )
     )
     shown, same = (plan.recipes[plan.illustrations["showcase"]] for plan in (one, other))
     assert shown == same

@@ -1,6 +1,6 @@
 """Stitches taken apart are those of an evaluation, and what is written down of them is right."""
 
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -15,19 +15,33 @@ from stitching.models.dynamics import Dynamics
 from stitching.planning.objective import spread_over_members
 from stitching.planning.random_shooting import RandomShooting
 from stitching.rollout import Play, RolloutConfig, play_from_start
-from stitching.stitchers import MBStitch, NoStitch, Stitcher
+from stitching.stitchers import MBStitch, NoStitch, Proposal, Stitcher
 
 EPISODES = 8
 PAIRS = [("b", "a"), ("b", "d"), ("d", "b")]
 LIMIT = 30
 
 
-@pytest.fixture(scope="module", params=["mb-stitch", "mb-stitch[execute=1]"])
+@dataclass(frozen=True)
+class EveryOther(MBStitch):
+    """Declines the second, fourth, … of those it is asked about."""
+
+    def propose(self, *asked: Any) -> Proposal:
+        proposal = super().propose(*asked)
+        return replace(proposal, wanted=np.arange(len(proposal.actions)) % 2 == 0)
+
+
+@pytest.fixture(scope="module", params=["mb-stitch", "mb-stitch[execute=1]", "every other"])
 def subject(
     maze: Maze, agent: Agent, stitchers: dict[str, Stitcher], request: pytest.FixtureRequest
 ) -> Subject:
-    stitcher = stitchers[request.param]
+    declines = request.param == "every other"
+    stitcher = stitchers["mb-stitch[execute=1]" if declines else request.param]
     assert isinstance(stitcher, MBStitch)
+    if declines:
+        stitcher = EveryOther(
+            **{each.name: getattr(stitcher, each.name) for each in fields(stitcher)}
+        )
     return Subject(maze, agent, stitcher, RolloutConfig(), LIMIT, root_seed=0, seed=0)
 
 

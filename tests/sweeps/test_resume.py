@@ -121,9 +121,19 @@ def test_a_torn_line_is_cut_and_nothing_is_lost(done: Path, expected: dict[str, 
 def test_a_journal_torn_anywhere_ends_the_same(done: Path, expected: dict[str, Any]) -> None:
     path = done / "sweep" / JOURNAL
     path.write_bytes(path.read_bytes()[:-1000])
-    path.with_name(f"{JOURNAL}.lock").touch()  # Optuna's own, as a kill leaves it
     sweep_in(done, SWEEP)
     assert promised(done, SWEEP) == expected
+
+
+def test_a_lock_left_by_a_kill_holds_nobody_up(done: Path) -> None:
+    """Optuna's own, which it takes to be somebody's for half a minute unless told otherwise."""
+    study = SweepStudy(SWEEP, done / "sweep")
+    lock = study.path.with_name(f"{JOURNAL}.lock")
+    lock.touch()
+    began = time.monotonic()
+    study.study.set_user_attr("seen", True)
+    assert not lock.exists()
+    assert time.monotonic() - began < 20
 
 
 def test_damage_in_the_middle_is_named(tmp_path: Path) -> None:

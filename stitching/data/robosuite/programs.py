@@ -35,8 +35,8 @@ class Waypoint:
 
 W = Waypoint
 
-# A hand takes hold as soon as the object is between its fingers (m), and goes nowhere without it
-# (m): what it shows follows from what it sees, or else nobody could learn it.
+# A hand takes hold once it is about where it means to (m), and a can that is not with the gripper
+# (m) is not carried: what it shows has to follow from what it sees, or nobody could learn it.
 BETWEEN, HELD = 0.025, 0.05
 
 
