@@ -35,26 +35,27 @@ class Waypoint:
 
 W = Waypoint
 
-# A hand takes hold once it is about where it means to (m), and a can that is not with the gripper
-# (m) is not carried: what it shows has to follow from what it sees, or nobody could learn it.
+# A hand takes hold once it is about where it means to (m), and begins again when the can or the
+# handle's end is not with the gripper (m): what it shows has to follow from what it sees, or nobody
+# could learn it.
 BETWEEN, HELD = 0.025, 0.05
 
 
 def _door(pull: float) -> tuple[Waypoint, ...]:
     """Take the handle's end between the fingers, turn it, and pull by so much (m) all the time."""
     angles = (0.4, 0.8, 1.2, 1.4)  # rad, of the handle
+    lever = [(LEVER - LEVER * float(np.cos(a)), 0.0, -LEVER * float(np.sin(a))) for a in angles]
     turning = [
-        W((LEVER - LEVER * float(np.cos(a)), 0.0, -LEVER * float(np.sin(a))), CLOSED, a, patience=1)
-        for a in angles
+        W(at, CLOSED, a, patience=1, holding=HELD) for at, a in zip(lever, angles, strict=True)
     ]
-    x, _, z = turning[-1].at
+    x, _, z = lever[-1]
     return (
         W((0.0, 0.2, 0.03), OPEN, near=0.05, patience=4),  # the hand swings round to face the door
         W((0.0, 0.1, 0.0), OPEN, near=0.03, patience=4),
         W((0.0, 0.0, 0.0), OPEN, near=BETWEEN, patience=8, loose=0.4),
         W((0.0, 0.0, 0.0), CLOSED, least=2, loose=0.4),
         *turning,
-        W((x, pull, z), CLOSED, angles[-1], near=0.0, patience=6, loose=0.4),
+        W((x, pull, z), CLOSED, angles[-1], near=0.0, patience=6, loose=0.4, holding=HELD),
     )
 
 
@@ -154,8 +155,8 @@ class Hand:
         return enough and bool(gap < waypoint.near or self._tried >= waypoint.patience)
 
     def _lost(self, observation: np.ndarray) -> bool:
-        origin, _ = object_frame(self._skill, observation)
-        gap = np.linalg.norm(origin - observation[GRIP_POSITION])
+        held = CAN_POSITION if self._skill == "can" else HANDLE_POSITION
+        gap = np.linalg.norm(observation[held] - observation[GRIP_POSITION])
         return bool(gap > self._todo[0][0].holding)
 
     def _begin(self) -> None:
