@@ -10,6 +10,7 @@ from pathlib import Path
 import pandas as pd
 from optuna.importance import get_param_importances
 
+from analysis.figures.drawn import DRAWING
 from analysis.files import replaced_folder
 from analysis.report import export_results
 from analysis.writers import seed_note, to_csv
@@ -52,7 +53,7 @@ def write_report(
     if results is not None and sweep.tables:
         for exported in export_results(directory.path / "table", results):
             for name in figures:
-                for suffix in ("svg", "png"):
+                for suffix in DRAWING:
                     source = directory.path / "report" / "figures" / f"{name}.{suffix}"
                     shutil.copyfile(source, exported / "figures" / f"sweep-{source.name}")
     elif results is not None:

@@ -1,12 +1,12 @@
 """The task that a run shows, as pictures: what happened in an episode, and what it was worth."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from analysis.figures.drawn import PHOTOGRAPH, Drawn
+from analysis.figures.drawn import DRAWING, PHOTOGRAPH, Drawn
 from analysis.figures.frames import render_frames
 from analysis.figures.maze import draw_showcase
 from analysis.figures.physics import draw_sheet, draw_values, segment_labels, sheet_steps
@@ -40,9 +40,15 @@ class _Shown:
     def name(self, figure: str) -> str:
         return f"{figure}-{self.part}" if self.part else figure
 
-    def drawn(self, figure: str, caption: str, missing: str = "") -> Drawn:
+    def drawn(
+        self,
+        figure: str,
+        caption: str,
+        missing: str = "",
+        formats: tuple[str, ...] = DRAWING,
+    ) -> Drawn:
         where = f"{self.part}: " if self.part and caption else ""
-        return Drawn(self.name(figure), where + caption, "", missing)
+        return Drawn(self.name(figure), where + caption, "", missing, formats)
 
 
 def draw_showcases(run: Run, folder: Path) -> list[Drawn]:
@@ -77,7 +83,7 @@ def _contact_sheet(shown: _Shown, folder: Path) -> Drawn:
     save(sheet, folder, shown.name("contact-sheet"), PHOTOGRAPH)
     method = shown.spec.methods.get(episode["method"], episode["method"])
     caption = f"{SHEET_CAPTION.format(method=method)} {VIEWS[showcase['benchmark']].note}"
-    return replace(shown.drawn("contact-sheet", caption.strip()), formats=PHOTOGRAPH)
+    return shown.drawn("contact-sheet", caption.strip(), formats=PHOTOGRAPH)
 
 
 def _which_episode(shown: _Shown) -> str:
