@@ -84,10 +84,10 @@ def _nodes_of_method(
     spec: RunSpec,
     quarantine: list[Mapping[str, Any]],
 ) -> _Nodes:
-    """The method's segments, with the first skills it shares with all others.
+    """The method's segments, with the first skills it shares with others.
 
-    The first skill comes before any stitching and is filed under method "". A method with other
-    policies (Single-Policy, another dataset level) has first skills of its own.
+    A first skill that is not stitched to is filed under method "". A method that stitches to it, or
+    has other policies (Single-Policy, another dataset level), has first skills of its own.
     """
     first = segments["depth"] == 1
     own = segments["method"] == method

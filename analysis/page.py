@@ -117,7 +117,7 @@ def _quarantine(run: Run) -> str:
         return ""
     lines = [
         [
-            block["method"] or "first skill of every method",
+            block["method"] or "first skill, shared",
             str(block["seed"]),
             run.spec.task_label(block["prefix"]),
             str(len(block["episodes"])),
@@ -248,8 +248,8 @@ def _reading(run: Run, tables: list[Table]) -> str:
         "episodes for so long, so a thousand of them are no thousand witnesses. "
         f"{seed_note(fewest)}",
         "Gains are paired: methods meet the same random numbers of the environment in the same "
-        "(seed, task, episode), first skills are the same episodes for most, and the interval is "
-        "that of the difference.",
+        "(seed, task, episode), methods that do not stitch to first skills share those, and the "
+        "interval is that of the difference.",
         "Environments, data and unpublished details are our own: agreement with the paper means "
         "the same effect under the same protocol, not the same random numbers.",
     ]

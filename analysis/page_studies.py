@@ -35,11 +35,21 @@ def pairs_section(run: Run, groups: pd.DataFrame | None) -> str:
         "How often the second skill succeeds once the first has. A pair is in the data if its "
         "skills follow one another in some demonstration. In rates and gains every pair weighs "
         "the same, and every seed, so a rate may differ a little from successes over trials. "
-        f"Methods share their first skills; gains over {baseline} are paired by seed, pair and "
+        f"{_shared_firsts(run)}gains over {baseline} are paired by seed, pair and "
         "episode. 95 % intervals are from resampling seeds, and within a seed each first skill's "
         "episodes, together for all pairs that begin with it; pairs are fixed. "
         f"{seed_note(int(groups['seeds'].min()))}"
     ) + html_table(header, lines)
+
+
+def _shared_firsts(run: Run) -> str:
+    """Whose first skills the second ones follow."""
+    if not run.spec.own_first_skill:
+        return "Methods share their first skills; "
+    return (
+        "A method that stitches to first skills has its own, so it may come to other second skills "
+        "than another; "
+    )
 
 
 def _gain(row: Record) -> str:

@@ -41,7 +41,8 @@ def segments_frame(plan: Plan, ledger: Ledger) -> pd.DataFrame:
         }
         | {name: np.concatenate(parts) for name, parts in columns.items()}
     )
-    frame.loc[frame["depth"] == 1, ["value_start", "value_end"]] = np.float32(np.nan)
+    # Where nothing can stitch, values before and after a stitch are of no use.
+    frame.loc[frame["method"] == "", ["value_start", "value_end"]] = np.float32(np.nan)
     return frame
 
 

@@ -95,7 +95,7 @@ def _kitchen_label(config: KitchenDataConfig) -> str:
 
 
 def short_order(order: Order) -> str:
-    """ "microwave-bottom-hinge-slide": as the human orders are written."""
+    """ "microwave-bottom-top-slide": as the human orders are written."""
     return "-".join(name.split()[0] for name in order)
 
 

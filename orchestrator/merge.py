@@ -12,7 +12,7 @@ import pandas as pd
 from analysis.run import SEPARATOR, VARIANT, plain_label
 from orchestrator.errors import UsageError
 from orchestrator.kits import KITS
-from orchestrator.methods import method_label
+from orchestrator.methods import first_method, method_label
 from orchestrator.rundir import RunDirectory
 from orchestrator.structure import Plain, to_plain
 from orchestrator.suite import Part, Suite, part_directory, suite_of
@@ -47,10 +47,11 @@ class Naming:
         return SEPARATOR.join(map(self.skill, prefix.split(SEPARATOR)))
 
     def played_by(self, method: str) -> list[str]:
-        """The merged methods of a part's segment or block; first skills ("") are all methods'."""
+        """The merged methods of a part's segment or block; "" is all that share first skills."""
         if method or not self.suite.by_variant:
             return [self.method(method) if method else ""]
-        return [self.method(each) for each in self.part.spec.methods]
+        spec = self.part.spec
+        return [self.method(m) for m in spec.methods if not first_method(m, spec.rollout)]
 
 
 def describe_suite(suite: Suite) -> Plain:
@@ -73,7 +74,8 @@ def describe_suite(suite: Suite) -> Plain:
                 (name := Naming(suite, part).method(method)): {
                     "name": name,
                     "label": Naming(suite, part).label(method),
-                    "own_first_skill": suite.by_variant,
+                    "own_first_skill": suite.by_variant
+                    or bool(first_method(method, part.spec.rollout)),
                 }
                 for part in suite.parts
                 for method in part.spec.methods

@@ -18,6 +18,7 @@ from stitching.models.iql import IQLConfig
 from stitching.planning.cem import CEM
 from stitching.planning.objective import Norm
 from stitching.planning.random_shooting import RandomShooting
+from stitching.rollout import RolloutConfig
 from stitching.stitchers import MBStitch, MFStitch, NoStitch, RandomStitch, Stitcher
 
 
@@ -62,15 +63,25 @@ MethodConfig = NoStitchConfig | RandomStitchConfig | MFStitchConfig | MBStitchCo
 class Method:
     label: str
     config: type[MethodConfig]
+    stitcher: type[Stitcher]
     needs: tuple[str, ...] = ()  # kinds of artifacts beside the agent
 
 
 METHODS: dict[str, Method] = {
-    "no-stitch": Method("No-Stitch", NoStitchConfig),
-    "random-stitch": Method("Random-Stitch", RandomStitchConfig),
-    "mf-stitch": Method("MF-Stitch", MFStitchConfig, needs=("mf-policy",)),
-    "mb-stitch": Method("MB-Stitch", MBStitchConfig, needs=("dynamics",)),
+    "no-stitch": Method("No-Stitch", NoStitchConfig, NoStitch),
+    "random-stitch": Method("Random-Stitch", RandomStitchConfig, RandomStitch),
+    "mf-stitch": Method("MF-Stitch", MFStitchConfig, MFStitch, needs=("mf-policy",)),
+    "mb-stitch": Method("MB-Stitch", MBStitchConfig, MBStitch, needs=("dynamics",)),
 }
+
+
+def first_method(method: str, rollout: RolloutConfig) -> str:
+    """Whose a method's first skills are: its own where it stitches to them, else "".
+
+    Methods that do not stitch before a first skill play it alike, and share it.
+    """
+    own = rollout.first_stitch and METHODS[method_name(method)].stitcher.before_first
+    return method if own else ""
 
 
 def parse_method(method: str) -> tuple[str, dict[str, Any]]:
@@ -115,7 +126,7 @@ def make_stitcher(
 ) -> Stitcher:
     """The stitcher of a method, from its plain settings and the models it needs, by kind.
 
-    First skills come before any stitching and have method "": the same for every method.
+    First skills that are not stitched to have method "": the same for every method.
     """
     if not method:
         return NoStitch()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain, pairwise
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 from orchestrator.builders import BLOCK_CODE, BLOCK_SETUP
 from orchestrator.jobs import BlockTask
 from orchestrator.kits import KITS, TEACHING, Illustration
-from orchestrator.methods import METHODS, MFStitchConfig, method_name
+from orchestrator.methods import METHODS, MFStitchConfig, first_method, method_name
 from orchestrator.recipes import Recipe, code_fingerprint, digest
 from orchestrator.spec import Spec
 from orchestrator.structure import Plain, to_plain
@@ -21,18 +21,12 @@ Prefix = tuple[str, ...]
 
 @dataclass(frozen=True)
 class Node:
-    """One more skill for the episodes that survived a prefix. First skills have no method."""
+    """One more skill for the episodes that survived a prefix."""
 
     seed: int
-    method: str
+    method: str  # "" for first skills that are not stitched to: those of every such method
     prefix: Prefix
-
-    @property
-    def parent(self) -> Node | None:
-        if len(self.prefix) == 1:
-            return None
-        method = self.method if len(self.prefix) > 2 else ""
-        return Node(self.seed, method, self.prefix[:-1])
+    parent: Node | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True)
@@ -224,11 +218,16 @@ def _spread_out(pairs: list[Prefix], most: int) -> list[Prefix]:
 
 def _nodes(spec: Spec) -> list[Node]:
     """Every prefix of every task, parents first, each once."""
-    nodes: dict[Node, None] = {}
+    nodes: dict[tuple[int, str, Prefix], Node] = {}
     for seed in range(spec.seeds):
         for depth in range(1, max(map(len, spec.all_tasks)) + 1):
-            for method in spec.methods if depth > 1 else ("",):
+            for method in spec.methods:
+                first = first_method(method, spec.rollout)
+                player = method if depth > 1 else first
+                above = method if depth > 2 else first
                 for task in spec.all_tasks:
-                    if len(task) >= depth:
-                        nodes[Node(seed, method, task[:depth])] = None
-    return list(nodes)
+                    place = seed, player, task[:depth]
+                    if len(task) >= depth and place not in nodes:
+                        parent = nodes[seed, above, task[: depth - 1]] if depth > 1 else None
+                        nodes[place] = Node(*place, parent)
+    return list(nodes.values())

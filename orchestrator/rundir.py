@@ -17,7 +17,7 @@ import analysis
 from orchestrator.errors import ChangedError, LockedError, UsageError
 from orchestrator.kits import KITS
 from orchestrator.ledger import Ledger
-from orchestrator.methods import method_label
+from orchestrator.methods import first_method, method_label
 from orchestrator.plan import make_plan
 from orchestrator.provenance import matters
 from orchestrator.spec import Spec, TableSpec, differences, spec_from_plain
@@ -165,7 +165,14 @@ def describe(spec: Spec) -> Plain:
         "benchmark": spec.benchmark,
         "scale": spec.scale,
         "skills": spec.skill_names,
-        "methods": [{"name": method, "label": method_label(method)} for method in spec.methods],
+        "methods": [
+            {
+                "name": method,
+                "label": method_label(method),
+                "own_first_skill": bool(first_method(method, spec.rollout)),
+            }
+            for method in spec.methods
+        ],
         "seeds": list(range(spec.seeds)),
         "episodes": spec.episodes,
         "tasks": [">".join(task) for task in spec.all_tasks],

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import compress
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import torch
@@ -157,6 +157,8 @@ class Witness:
         self._expected: list[Numbers] = []  # of plans whose first action is still to be taken
         self.traces: dict[int, Trace] = {}  # by episode
 
+    before_first: ClassVar[bool] = MBStitch.before_first
+
     @property
     def limit(self) -> int:
         return self._stitcher.limit
@@ -164,7 +166,7 @@ class Witness:
     def propose(
         self,
         states: Tensor,
-        previous: int,
+        previous: int | None,
         following: int,
         streams: Sequence[np.random.Generator],
     ) -> Proposal:

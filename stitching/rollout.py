@@ -24,6 +24,7 @@ class RolloutConfig:
     sample_actions: bool = False  # sample the policy; its mode otherwise, as in IQL's evaluation
     skill_limit: int = 0  # most steps of one skill, its stitch included; 0: only the task's own
     stop_alpha: float = 0.0  # price of the values' disagreement when a stitch asks whether to go on
+    first_stitch: bool = False  # stitch before a task's first skill, too, as Algorithm 1 is printed
 
 
 @dataclass(frozen=True)
@@ -121,8 +122,9 @@ def play_segment(
 
     value = partial(_value, agent, config.stop_alpha, block)
     value_start = value(rows, skill)
-    if len(play.prefix) > 1 and stitcher.limit:
-        _stitch(progress, stitcher, play, names.index(play.prefix[-2]), value_start, value)
+    previous = names.index(play.prefix[-2]) if len(play.prefix) > 1 else None
+    if previous is not None or (config.first_stitch and stitcher.before_first):
+        _stitch(progress, stitcher, play, previous, value_start, value)
     stitch_steps = progress.steps.copy()
     value_end = value(rows, skill)
     _execute(progress, agent, benchmark, config, play)
@@ -140,7 +142,7 @@ def _stitch(
     progress: _Progress,
     stitcher: Stitcher,
     play: Play,
-    previous: int,
+    previous: int | None,
     value_start: np.ndarray,
     value: Callable[[np.ndarray, int], np.ndarray],
 ) -> None:
@@ -149,7 +151,7 @@ def _stitch(
     streams = play.streams("planner", by_method=True)
     values = value_start.copy()
     rows = progress.open(np.arange(len(values)))
-    while len(rows):
+    while len(rows) and stitcher.limit:
         proposal = stitcher.propose(
             torch.from_numpy(progress.block.observe(rows)),
             previous,

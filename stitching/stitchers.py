@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 import torch
@@ -32,7 +32,9 @@ class Proposal:
 
 
 class Stitcher(Protocol):
-    """Chooses the actions between two skills, and whether there are to be any."""
+    """Chooses the actions that lead to a skill, and whether there are to be any."""
+
+    before_first: ClassVar[bool]  # it can stitch to a task's first skill, which follows none
 
     @property
     def limit(self) -> int:
@@ -42,13 +44,13 @@ class Stitcher(Protocol):
     def propose(
         self,
         states: Tensor,
-        previous: int,
+        previous: int | None,
         following: int,
         streams: Sequence[np.random.Generator],
     ) -> Proposal:
         """Actions to execute before the value is looked at again.
 
-        For states (n, observation), with one stream each.
+        For states (n, observation), with one stream each. previous: None before a first skill.
         """
 
 
@@ -56,12 +58,13 @@ class Stitcher(Protocol):
 class NoStitch:
     """The next skill starts where the last one ended."""
 
+    before_first: ClassVar[bool] = False
     limit: int = 0
 
     def propose(
         self,
         states: Tensor,
-        previous: int,
+        previous: int | None,
         following: int,
         streams: Sequence[np.random.Generator],
     ) -> Proposal:
@@ -72,13 +75,14 @@ class NoStitch:
 class RandomStitch:
     """Uniform random actions, under the same stop rule as MB-Stitch."""
 
+    before_first: ClassVar[bool] = True
     actions: ActionSpace
     limit: int
 
     def propose(
         self,
         states: Tensor,
-        previous: int,
+        previous: int | None,
         following: int,
         streams: Sequence[np.random.Generator],
     ) -> Proposal:
@@ -89,6 +93,7 @@ class RandomStitch:
 class MFStitch:
     """The mode of an extra policy learned from the mixed data; conditioned on the pair."""
 
+    before_first: ClassVar[bool] = False  # there is no pair
     policy: Agent
     pairs: dict[tuple[int, int], int]  # (previous, following) → the policy's condition
     limit: int
@@ -96,10 +101,11 @@ class MFStitch:
     def propose(
         self,
         states: Tensor,
-        previous: int,
+        previous: int | None,
         following: int,
         streams: Sequence[np.random.Generator],
     ) -> Proposal:
+        assert previous is not None
         actions = self.policy.act(states, self.pairs[previous, following], noise=None)
         return Proposal.of(actions[:, None])
 
@@ -108,6 +114,7 @@ class MFStitch:
 class MBStitch:
     """Ours: plan with the dynamics ensemble towards high, certain value of the next skill."""
 
+    before_first: ClassVar[bool] = True
     agent: Agent
     dynamics: Dynamics
     planner: Planner
@@ -127,7 +134,7 @@ class MBStitch:
     def propose(
         self,
         states: Tensor,
-        previous: int,
+        previous: int | None,
         following: int,
         streams: Sequence[np.random.Generator],
     ) -> Proposal:

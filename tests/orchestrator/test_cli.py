@@ -149,7 +149,7 @@ def test_a_plan_of_nothing_yet(cli: Cli, tmp_path: Path) -> None:
     assert "6 tasks × 4 methods × 2 seeds × 6 episodes = 288 episodes" in answer.out
     rows = counts(answer)
     assert rows["agent"] == rows["dynamics"] == rows["mf-policy"] == [0, 2]
-    assert rows["first skills (all)"] == [0, 16, 0]
+    assert rows["first skills, shared"] == [0, 16, 0]
     assert rows["MB-Stitch"] == rows["No-Stitch"] == [0, 24, 0]
     assert not (tmp_path / "store").exists()
 

@@ -17,10 +17,11 @@ from tests.orchestrator.tiny import Alone, Lines, Place, carry_out, promised_byt
 METHODS = ("no-stitch", "random-stitch", "mf-stitch", "mb-stitch")
 
 
-@pytest.fixture(scope="module")
-def deep(spec: Spec) -> Spec:
+@pytest.fixture(scope="module", params=[False, True], ids=["between skills", "first, too"])
+def deep(spec: Spec, request: pytest.FixtureRequest) -> Spec:
     """Three skills deep, so that stitched segments have stitched parents."""
-    return replace(spec, lengths=(2, 3), tasks=())
+    rollout = replace(spec.rollout, first_stitch=request.param)
+    return replace(spec, lengths=(2, 3), tasks=(), rollout=rollout)
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +52,10 @@ def test_the_problem_is_worth_comparing(serial: Place, deep: Spec) -> None:
     assert (stitches.drop("no-stitch") > 0).all()
     assert stitches["no-stitch"] == 0
     assert (segments["depth"] == 3).any()
+    first = segments[segments["depth"] == 1]
+    own = {"random-stitch", "mb-stitch"} if deep.rollout.first_stitch else set()
+    assert set(first["method"]) == {"", *own}
+    assert set(first.loc[first["stitch_steps"] > 0, "method"]) == own
 
 
 class Scrambled(SerialExecutor):

@@ -6,12 +6,14 @@ from itertools import permutations
 import pytest
 
 from orchestrator.builders import BLOCK_CODE, BLOCK_SETUP
+from orchestrator.methods import first_method
 from orchestrator.plan import Node, Plan, make_plan
 from orchestrator.recipes import _closure
 from orchestrator.spec import Spec, load_spec
 from stitching.envs.kitchen import KITCHEN
 from stitching.envs.maze import MAZE
 from stitching.envs.registry import BENCHMARKS
+from stitching.rollout import RolloutConfig
 
 
 @pytest.fixture(scope="module")
@@ -47,10 +49,29 @@ def test_nodes_are_the_prefixes_of_all_tasks(plan: Plan, spec: Spec) -> None:
     assert set(plan.nodes) == expected
 
 
-def test_parents_come_first(plan: Plan) -> None:
+FIRST = RolloutConfig(first_stitch=True)
+
+
+def test_first_skills_that_are_stitched_to_belong_to_their_method(spec: Spec) -> None:
+    """No-Stitch and MF-Stitch, which has no pair there, share one."""
+    firsts = [node for node in make_plan(replace(spec, rollout=FIRST)).nodes if not node.parent]
+    owners = ("", "random-stitch", "mb-stitch")
+    assert {(node.method, node.prefix) for node in firsts} == {
+        (method, (skill,)) for method in owners for skill in spec.skill_names
+    }
+
+
+@pytest.mark.parametrize("rollout", [RolloutConfig(), FIRST])
+def test_parents_come_first(spec: Spec, rollout: RolloutConfig) -> None:
     seen: set[Node] = set()
-    for node in plan.nodes:
-        assert node.parent is None or node.parent in seen
+    for node in make_plan(replace(spec, rollout=rollout)).nodes:
+        if node.parent is None:
+            assert len(node.prefix) == 1
+        else:
+            assert node.parent in seen
+            assert node.parent.prefix == node.prefix[:-1]
+            shared = first_method(node.method, rollout) == ""
+            assert node.parent.method == ("" if shared and len(node.prefix) == 2 else node.method)
         seen.add(node)
 
 
@@ -81,6 +102,17 @@ def test_plans_are_the_same_every_time(plan: Plan, spec: Spec) -> None:
     assert block_keys(again) == block_keys(plan)
     assert list(again.recipes) == list(plan.recipes)
     assert len(set(block_keys(plan).values())) == len(plan.tasks)
+
+
+def test_alpha_touches_first_skills_only_where_they_are_stitched_to(spec: Spec) -> None:
+    spec = replace(spec, rollout=FIRST)
+    plan = make_plan(spec)
+    other = make_plan(replace(spec, mb_stitch=replace(spec.mb_stitch, alpha=5.0)))
+    touched = changed(plan, other)
+    assert touched == {node for node in plan.nodes if node.method == "mb-stitch"}
+    assert {node.prefix for node in touched if not node.parent} == {
+        (skill,) for skill in spec.skill_names
+    }
 
 
 def test_alpha_touches_only_mb_stitch_after_the_first_skill(plan: Plan, spec: Spec) -> None:

@@ -11,7 +11,7 @@ from orchestrator.builders.models import load_models
 from orchestrator.executors.serial import SerialExecutor
 from orchestrator.jobs import BuildJob, Job
 from orchestrator.ledger import Ledger, Outcome
-from orchestrator.methods import make_stitcher, method_name
+from orchestrator.methods import first_method, make_stitcher, method_name
 from orchestrator.plan import Node, Plan
 from orchestrator.progress import Silent
 from orchestrator.reproduce import Settings, reproduce
@@ -167,7 +167,11 @@ class Alone:
     def recorded(self) -> list[Outcome]:
         """What the tree has for the same, one outcome a skill while any episode survives."""
         nodes = [
-            Node(self.seed, self.method if depth > 1 else "", self.task[:depth])
+            Node(
+                self.seed,
+                self.method if depth > 1 else first_method(self.method, self.plan.spec.rollout),
+                self.task[:depth],
+            )
             for depth in range(1, len(self.task) + 1)
         ]
         ledger = self.place.directory.ledger(read_only=True)

@@ -31,11 +31,13 @@ from stitching.rollout import (
 from stitching.stitchers import NoStitch, Proposal, RandomStitch, Stitcher
 
 SAMPLED, MODE = RolloutConfig(sample_actions=True), RolloutConfig()
+FIRST = replace(SAMPLED, first_stitch=True)
 STEP_LIMIT = 40
 METHODS = ["no-stitch", "random-stitch", "mf-stitch", "mb-stitch", "mb-stitch[execute=1]"]
 TASKS = [("a", "b", "c"), ("d", "b", "a"), ("b", "d", "c", "a"), ("c", "a", "d", "b")]
 
 each_method = pytest.mark.parametrize("method", METHODS)
+each_reading = pytest.mark.parametrize("config", [SAMPLED, FIRST], ids=["between", "first"])
 
 
 def play_of(method: str, prefix: Sequence[str], episodes: Sequence[int] = range(6)) -> Play:
@@ -86,8 +88,9 @@ class Tree:
     def node(self, play: Play, step_limit: int) -> tuple[Play, Segments, np.ndarray]:
         """What was played at the node, the outcome, and steps used by each episode since start."""
         first = len(play.prefix) == 1
-        # First skills come before any stitching: one node for all methods.
-        here = replace(play, method="") if first else play
+        stitched = self.config.first_stitch and self.stitchers[play.method].before_first
+        # First skills that are not stitched to: one node for all methods.
+        here = replace(play, method="") if first and not stitched else play
         key = here.method, here.prefix
         if key in self.nodes:
             return self.nodes[key]
@@ -102,7 +105,7 @@ class Tree:
             stored = np.ascontiguousarray(outcome.snapshots[survived])
             snapshots = np.frombuffer(stored.tobytes()).reshape(stored.shape)
         begin(self.block, here, snapshots)
-        stitcher = NoStitch() if first else self.stitchers[play.method]
+        stitcher = self.stitchers[play.method] if here.method else NoStitch()
         segments = play_segment(
             self.block, self.agent, stitcher, self.maze, self.config, here, step_limit - used
         )
@@ -121,15 +124,21 @@ class Tree:
 
 
 @each_method
+@each_reading
 @pytest.mark.parametrize("episodes", [range(1), range(5, 8), range(16)], ids=len)
 def test_the_tree_gives_the_bytes_of_playing_each_task_alone(
-    maze: Maze, agent: Agent, stitchers: dict[str, Stitcher], method: str, episodes: range
+    maze: Maze,
+    agent: Agent,
+    stitchers: dict[str, Stitcher],
+    method: str,
+    config: RolloutConfig,
+    episodes: range,
 ) -> None:
-    tree = Tree(maze, agent, stitchers, SAMPLED)
+    tree = Tree(maze, agent, stitchers, config)
     for task in TASKS:
         play = play_of(method, task, episodes)
         alone = play_from_start(
-            maze.block(), agent, stitchers[method], maze, SAMPLED, play, STEP_LIMIT
+            maze.block(), agent, stitchers[method], maze, config, play, STEP_LIMIT
         )
         from_tree = tree.task(play, STEP_LIMIT)
         assert [raw(s) for s in alone] == [raw(s) for s in from_tree]
@@ -154,6 +163,24 @@ def test_a_whole_tree_gives_the_bytes_of_every_task(
         assert [raw(s) for s in alone] == [raw(s) for s in tree.task(play, STEP_LIMIT)]
         reached[len(alone), bool(alone[-1].success.all())] += 1
     assert len(reached) > 1  # tasks ended differently: there was something to confuse
+
+
+@each_method
+def test_a_first_skill_is_stitched_to_where_the_method_can(
+    maze: Maze, agent: Agent, stitchers: dict[str, Stitcher], method: str
+) -> None:
+    def first(config: RolloutConfig) -> Segments:
+        play = play_of(method, TASKS[0][:1], range(12))
+        (segments,) = play_from_start(
+            maze.block(), agent, stitchers[method], maze, config, play, STEP_LIMIT
+        )
+        return segments
+
+    without, with_first = first(SAMPLED), first(FIRST)
+    assert not without.stitch_steps.any()
+    assert with_first.stitch_steps.any() == stitchers[method].before_first
+    if not stitchers[method].before_first:
+        assert raw(without) == raw(with_first)
 
 
 @each_method

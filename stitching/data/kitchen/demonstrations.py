@@ -21,19 +21,22 @@ from stitching.streams import stream
 
 SHORT = {name.split()[0]: name for name in SKILLS}
 HUMAN_ORDERS = """
-kettle-bottom-hinge-slide kettle-bottom-light-slide kettle-bottom-light-hinge
-kettle-light-hinge-slide kettle-top-bottom-slide kettle-top-bottom-hinge
-kettle-top-bottom-light kettle-top-light-slide microwave-bottom-hinge-slide
-microwave-bottom-light-slide microwave-kettle-bottom-hinge microwave-kettle-bottom-slide
-microwave-kettle-hinge-slide microwave-kettle-light-slide microwave-kettle-light-hinge
-microwave-kettle-top-hinge microwave-kettle-top-light microwave-light-hinge-slide
-microwave-top-bottom-hinge microwave-top-bottom-slide microwave-top-bottom-light
-microwave-top-light-hinge top-bottom-hinge-slide top-bottom-light-slide
+kettle-top-hinge-slide kettle-top-light-slide kettle-top-light-hinge kettle-light-hinge-slide
+kettle-bottom-top-slide kettle-bottom-top-hinge kettle-bottom-top-light kettle-bottom-light-slide
+microwave-top-hinge-slide microwave-top-light-slide microwave-kettle-top-hinge
+microwave-kettle-top-slide microwave-kettle-hinge-slide microwave-kettle-light-slide
+microwave-kettle-light-hinge microwave-kettle-bottom-hinge microwave-kettle-bottom-light
+microwave-light-hinge-slide microwave-bottom-top-hinge microwave-bottom-top-slide
+microwave-bottom-top-light microwave-bottom-light-hinge bottom-top-hinge-slide
+bottom-top-light-slide
 """
 
 
 def human_orders() -> tuple[Order, ...]:
-    """The 24 orders in which people did four skills for Relay Policy Learning (2019)."""
+    """The 24 orders in which people did four skills for Relay Policy Learning (2019).
+
+    In FrankaKitchen's names: the recordings call "topknob" what it calls the bottom burner.
+    """
     return tuple(tuple(SHORT[word] for word in order.split("-")) for order in HUMAN_ORDERS.split())
 
 
