@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import get_args
 
 from orchestrator.errors import UsageError
 from orchestrator.rundir import RunDirectory
-from orchestrator.spec import Spec
+from orchestrator.spec import Scale, Spec
 from orchestrator.structure import Plain
 from sweeps.space import replaced
 
@@ -16,7 +17,7 @@ RUNS = Path("runs")
 def find_sweep(name: str) -> Path:
     """A sweep's directory, by its path, or by its name at the largest scale that has a winner."""
     places = [Path(name)]
-    places += [RUNS / f"sweep-{name}-{scale}" for scale in ("paper", "quick", "smoke")]
+    places += [RUNS / f"sweep-{name}-{scale}" for scale in reversed(get_args(Scale))]
     for place in places:
         if (place / "winner.json").is_file():
             return place

@@ -51,7 +51,7 @@ class KitchenDataConfig:
     held_out: int = 8  # more of each order, to judge models by
     quality: float = 0.9  # of the hand: from 1, a steady expert, down to 0
     qualities: dict[str, float] = field(default_factory=dict)  # skill → another quality for it
-    wait: int = 0  # steps, at most, that a demonstration stands still at first; people do for about 8
+    wait: int = 0  # steps, at most, for which a demonstration stands still first; people: some 8
     elsewhere: float = 0.0  # share of later skills that begin at a free pose, not where one ended
     skill_steps: int = 160  # after which a skill counts as missed and the demonstration ends
     return_home: bool = False  # to the start posture before another skill; people do not
