@@ -75,13 +75,16 @@ def work_out(method: str, kind: str, skill: str) -> tuple[float, float]:
     """The least and the largest rate that Table 8 allows: two linear programs."""
     prefixes = averaged(kind, skill)
     weights = _sum_of(prefixes)[0] / len(prefixes)
-    coefficients, limits = _fits(method)
-    A: Any = coefficients  # linprog takes sparse matrices; its type stubs do not say so
-    ends = [
-        linprog(sign * weights, A_ub=A, b_ub=limits, bounds=(0, 1), method="highs")
-        for sign in (1, -1)
-    ]
-    return float(ends[0].fun), float(-ends[1].fun)
+    return _least(method, weights), -_least(method, -weights)
+
+
+def _least(method: str, weights: np.ndarray) -> float:
+    """The least weighted sum of success rates that fits the method's cells."""
+    rows, limits = _fits(method)
+    A: Any = rows  # linprog takes sparse matrices; its type stubs do not say so
+    found = linprog(weights, A_ub=A, b_ub=limits, bounds=(0, 1), method="highs")
+    assert found.fun is not None, "Table 8 fits no success rates"
+    return float(found.fun)
 
 
 def can_share_first_skills(one: str, other: str) -> bool:
