@@ -12,6 +12,8 @@ import pandas as pd
 from analysis.figures import Drawn
 from analysis.page_studies import models_section, pairs_section, stitches_section
 from analysis.page_tables import claims_html, gains_html, html_table, scores_html
+from analysis.profile_text import TITLE as PROFILE_TITLE
+from analysis.profile_text import profile_section
 from analysis.run import Run
 from analysis.skills import permutation_scores, single_skill_rates
 from analysis.tables import Table
@@ -57,6 +59,7 @@ def render_page(
                 if not figure.table and figure.name not in OF_MODELS + OF_STITCHES
             ),
         ),
+        "profile": (PROFILE_TITLE, profile_section(studies.get("profile"), run.spec)),
         "pairs": ("Pairs of skills", pairs_section(run, studies.get("pair-groups"))),
         "models": (
             "Are the models right?",

@@ -9,7 +9,7 @@ import pandas as pd
 
 from analysis.episodes import episodes_from_segments
 from analysis.implied import FIRST, MEAN, SECOND, averaged, bounds, known_methods
-from analysis.run import SEPARATOR, VARIANT, RunError, RunSpec
+from analysis.run import SEPARATOR, VARIANT, Run, RunError, RunSpec
 from analysis.statistics import arrange, estimate, generator, wilson
 
 MARGIN = 0.1
@@ -19,6 +19,21 @@ COLUMNS = [
     "method", "kind", "skill", "successes", "n", "rate", "ci_low", "ci_high",
     "implied_low", "implied_high", "inside",
 ]  # fmt: skip
+
+
+PAPER_TABLES = {"2", "8"}
+"""The paper's, whose episodes these bounds are of."""
+
+
+def profiles(run: Run) -> pd.DataFrame | None:
+    """COLUMNS for all methods of a run of such a table; None for other runs."""
+    of_the_paper = PAPER_TABLES & {table.paper for table in run.spec.tables}
+    if not of_the_paper or run.spec.parts:
+        return None
+    return pd.concat(
+        [profile(run.segments, run.spec, method, run.quarantine) for method in run.spec.methods],
+        ignore_index=True,
+    )
 
 
 def profile(
@@ -49,7 +64,7 @@ def profile(
     rows = []
     for kind, length in ((FIRST, 1), (SECOND, 2)):
         of_kind = played[played["length"] == length]
-        last = of_kind["task"].str.rpartition(SEPARATOR)[2]
+        last = of_kind["task"].str.split(SEPARATOR).str[-1]
         for skill in (*spec.skills, MEAN):
             own = of_kind if skill == MEAN else of_kind[last == skill]
             if not own.empty:
