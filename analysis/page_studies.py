@@ -6,7 +6,7 @@ from html import escape
 
 import pandas as pd
 
-from analysis.anatomy import OUTCOMES, WARNINGS
+from analysis.anatomy import FIRST_SKILLS, HAND_OVERS, OUTCOMES, WARNINGS, by_kind, label
 from analysis.page_tables import html_table
 from analysis.pairs import BASELINE, shown_orders
 from analysis.run import Run
@@ -173,17 +173,17 @@ def _dynamics(run: Run, known: Known) -> str:
 
 
 def stitches_section(run: Run, studies: Mapping[str, pd.DataFrame]) -> str:
-    """What stitches did to the second skill, what was expected of them, and what warned."""
+    """What stitches did to the skill they lead to, what was expected of them, and what warned."""
     if "anatomy" not in studies or studies["stitches"].empty:
         return ""
     parts = studies["anatomy"].to_dict("records")
     header = [
-        "Data", "Second skill without", "with a stitch", "Stitches", "Helped", "Hurt",
+        "Stitches to", "Skill succeeds without", "with a stitch", "Stitches", "Helped", "Hurt",
         "Gain predicted", "Gain realised", "ρ", *(f"{name} (AUC)" for name in WARNINGS.values()),
     ]  # fmt: skip
     lines = [
         [
-            row["part"] or "all",
+            label(row["part"], row["kind"]),
             *(f"{row[f'successes_{how}']} of {row['episodes']}" for how in ("without", "with")),
             *(str(row[name]) for name in ("stitches", "helped", "hurt")),
             *(_signed(row[name], 3) for name in ("predicted_gain", "realised_gain")),
@@ -196,26 +196,26 @@ def stitches_section(run: Run, studies: Mapping[str, pd.DataFrame]) -> str:
         html_table(header, lines)
         + _by_outcome(studies["stitches"])
         + _note(
-            "Every ordered pair of skills, or some of them, from where the first one succeeded: "
+            f"{_begun_where(run)}"
             "once without a stitch and once with one, under the same random numbers. A stitch "
-            "helped where the second skill failed without and succeeded with it, and hurt where it "
+            "helped where the skill failed without and succeeded with it, and hurt where it "
             f"was the other way round; these are counts of few episodes ({_tried(run)}) by the "
-            "first seed's models, and no interval goes with them. Gain: of the next skill's value "
+            "first seed's models, and no interval goes with them. Gain: of that skill's value "
             "by a plan's first action, on average; ρ is the rank correlation of predicted with "
             "realised gains. AUC: how likely a stitch that hurt had the higher number of two, one "
             "that hurt and one that did not; 0.5 tells nothing, less is a number that is lower "
             "where stitches hurt. Spreads are those of Eq. 2 at the state predicted for a plan's "
-            "first action, averaged over the stitch; distances are to the next skill's own "
+            "first action, averaged over the stitch; distances are to that skill's own "
             "demonstrations, in standard deviations of the data."
         )
     )
 
 
 def _by_outcome(stitches: pd.DataFrame) -> str:
-    """Means over the stitches of each outcome, by part."""
+    """Means over the stitches of each outcome, by part and kind."""
     lines = [
         [
-            f"{part!s}: {name}" if part else name,
+            f"{label(str(part), str(kind))}: {name}",
             str(len(own)),
             f"{own['steps'].mean():.1f}",
             *(
@@ -225,9 +225,9 @@ def _by_outcome(stitches: pd.DataFrame) -> str:
             f"{own['value_spread'].mean():.3f}",
             f"{own['dynamics_spread'].mean():.4f}",
         ]
-        for part, of_part in stitches.groupby("part", sort=False)
+        for (part, kind), of_kind in stitches.groupby(["part", "kind"], sort=False)
         for name in OUTCOMES.values()
-        if len(own := of_part[of_part["outcome"] == name])
+        if len(own := of_kind[of_kind["outcome"] == name])
     ]
     header = [
         "The stitch", "Stitches", "Steps", "Value", "Distance to data", "Spread of values",
@@ -237,10 +237,20 @@ def _by_outcome(stitches: pd.DataFrame) -> str:
 
 
 def _tried(run: Run) -> str:
-    """ "20 pairs, 6 episodes of each" """
+    """ "7 first skills and 20 pairs, 6 episodes of each" """
     study = max(run.anatomy.values(), key=lambda one: len(one["pairs"]))
-    pairs = len(study["pairs"])
-    return f"{pairs} pair{'s'[: pairs != 1]}, {study['episodes']} episodes of each"
+    counts = {kind: len(own["pairs"]) for kind, own in by_kind(study).items()}
+    words = {FIRST_SKILLS: "first skill", HAND_OVERS: "pair"}
+    tried = [f"{count} {words[kind]}{'s'[: count != 1]}" for kind, count in counts.items()]
+    return f"{' and '.join(tried)}, {study['episodes']} episodes of each"
+
+
+def _begun_where(run: Run) -> str:
+    first = any(FIRST_SKILLS in by_kind(study) for study in run.anatomy.values())
+    return (
+        f"{'Every first skill from the start of an episode, and every' if first else 'Every'} "
+        "ordered pair of skills, or some of them, from where No-Stitch's first one succeeded: "
+    )
 
 
 def _signed(number: float, digits: int) -> str:

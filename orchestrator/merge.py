@@ -201,7 +201,11 @@ def anatomy_of_part(study: Plain, naming: Naming) -> Plain:
     """Stitches of a part, between skills as they are called where all parts meet."""
 
     def renamed(entry: Plain) -> Plain:
-        return entry | {name: naming.skill(entry[name]) for name in ("first", "second")}
+        first, second = entry["first"], entry["second"]  # nothing comes before a first skill
+        return entry | {
+            "first": naming.skill(first) if first else first,
+            "second": naming.skill(second),
+        }
 
     typical = study["typical_distance"].items()
     return study | {

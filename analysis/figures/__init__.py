@@ -64,9 +64,10 @@ VALUE_CURVES_CAPTION = (
 
 ANATOMY_CAPTION = (
     "Stitches of the first seed's models, coloured by what came of them: each episode was also "
-    "played on from the same state without a stitch. From left to right: the next skill's value, "
-    "ensemble mean, along each stitch; distance to the nearest state of that skill's own "
-    "demonstrations (1: one standard deviation in every number of the state), above the dashed "
+    "played on from the same state without a stitch. Stitches to a task's first skill, where there "
+    "are any, and those between two skills have a row each. From left to right: the value of the "
+    "skill to come, ensemble mean, along each stitch; distance to the nearest of that skill's own "
+    "demonstrated states (1: one standard deviation in every number of them), above the dashed "
     "line the stitch led away from them, dotted how near demonstrations are to one another; what "
     "each plan's first action was to gain in value and did, below the dashed line less than "
     "predicted; and how much the value members and the dynamics members disagreed about the state "
