@@ -169,10 +169,11 @@ def _single_skills(run: Run) -> str:
     rates = single_skill_rates(run.segments, run.spec)
     if rates.empty:
         return ""
+    shared = ", ".join(run.spec.sharing_first_skills) if run.spec.own_first_skill else "all methods"
     lines = [
         [
             run.spec.skill_label(rate["skill"]),
-            run.spec.methods.get(rate["method"], "all methods"),
+            run.spec.methods.get(rate["method"], shared),
             f"{rate['successes']:,} of {rate['trials']:,}",
             f"{rate['rate']:.3f}",
             f"[{rate['low']:.3f}, {rate['high']:.3f}]",

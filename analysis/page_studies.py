@@ -26,18 +26,21 @@ def pairs_section(run: Run, groups: pd.DataFrame | None) -> str:
             run.spec.methods[row["method"]],
             f"{row['successes']:,} of {row['trials']:,}",
             _unbroken(f"{row['rate']:.3f} [{row['ci_low']:.3f}, {row['ci_high']:.3f}]"),
-            _gain(row),
+            _gain(row, "gain"),
+            _unbroken(f"{row['both']:.3f} [{row['both_low']:.3f}, {row['both_high']:.3f}]"),
+            _gain(row, "both_gain"),
         ]
         for row in groups.to_dict("records")
     ]
-    header = ["Pairs", "Method", "Second skill succeeds", "Rate", f"Gain over {baseline}"]
+    gain = f"Gain over {baseline}"
+    header = ["Pairs", "Method", "Second skill succeeds", "Rate", gain, "Both succeed", gain]
     return _note(
-        "How often the second skill succeeds once the first has. A pair is in the data if its "
+        "How often the second skill succeeds once the first has, and how often both do, over all "
+        "episodes. A pair is in the data if its "
         "skills follow one another in some demonstration. In rates and gains every pair weighs "
         "the same, and every seed, so a rate may differ a little from successes over trials. "
-        f"{_shared_firsts(run)}gains over {baseline} are paired by seed, pair and "
-        "episode. 95 % intervals are from resampling seeds, and within a seed each first skill's "
-        "episodes, together for all pairs that begin with it; pairs are fixed. "
+        f"Gains over {baseline} are paired by seed, pair and episode. {_shared_firsts(run)}"
+        "95 % intervals are from resampling seeds, and within a seed each first skill's episodes,  together for all pairs that begin with it; pairs are fixed. "
         f"{seed_note(int(groups['seeds'].min()))}"
     ) + html_table(header, lines)
 
@@ -45,17 +48,18 @@ def pairs_section(run: Run, groups: pd.DataFrame | None) -> str:
 def _shared_firsts(run: Run) -> str:
     """Whose first skills the second ones follow."""
     if not run.spec.own_first_skill:
-        return "Methods share their first skills; "
+        return "Methods share their first skills. "
     return (
-        "A method that stitches to first skills has its own, so it may come to other second skills "
-        "than another; "
+        "A method that stitches to first skills has its own, so it comes to other second skills "
+        "than another, and from other states: their gain is over those episodes alone in which the "
+        "first skill succeeded under both, and that of both skills says what comes of all. "
     )
 
 
-def _gain(row: Record) -> str:
-    if math.isnan(row["gain"]):
+def _gain(row: Record, name: str) -> str:
+    if math.isnan(row[name]):
         return UNKNOWN
-    return _unbroken(f"{row['gain']:+.3f} [{row['gain_low']:+.3f}, {row['gain_high']:+.3f}]")
+    return _unbroken(f"{row[name]:+.3f} [{row[f'{name}_low']:+.3f}, {row[f'{name}_high']:+.3f}]")
 
 
 def _unbroken(text: str) -> str:

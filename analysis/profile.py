@@ -1,13 +1,12 @@
 """How often first and second skills succeed, beside what the paper's Table 8 implies for them."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from analysis.episodes import episodes_from_segments
+from analysis.episodes import beginnings
 from analysis.implied import FIRST, MEAN, SECOND, averaged, bounds, known_methods
 from analysis.run import SEPARATOR, VARIANT, Run, RunError, RunSpec
 from analysis.statistics import arrange, estimate, generator, wilson
@@ -59,7 +58,7 @@ def profile(
         raise RunError(f"{spec.name} was merged from several runs: a profile is of one of them")
     if method not in spec.methods:
         raise RunError(f"{spec.name} has no method {method}; it has {', '.join(spec.methods)}")
-    played = _first_two_skills(segments, spec, method, quarantine)
+    played = beginnings(segments, spec, method, quarantine)
     implied = _implied(method)
     rows = []
     for kind, length in ((FIRST, 1), (SECOND, 2)):
@@ -80,28 +79,6 @@ def _with_verdicts(table: pd.DataFrame) -> pd.DataFrame:
         table["implied_low"] - MARGIN - 1e-9, table["implied_high"] + MARGIN + 1e-9
     )
     return table.assign(inside=near.astype("boolean").where(table["implied_low"].notna()))
-
-
-def _first_two_skills(
-    segments: pd.DataFrame, spec: RunSpec, method: str, quarantine: Iterable[Mapping[str, Any]]
-) -> pd.DataFrame:
-    """Episodes of the beginnings of all tasks, within the step limit of two skills.
-
-    As of `episodes_from_segments`, with success: 1.0 where every skill was accomplished.
-    """
-    walks = [task.split(SEPARATOR) for task in spec.tasks]
-    prefixes = dict.fromkeys(
-        SEPARATOR.join(walk[:length]) for length in (1, 2) for walk in walks if len(walk) >= length
-    )
-    limit = spec.step_limits.get(2, max(spec.step_limits.values()))
-    short = replace(
-        spec,
-        methods={method: spec.methods[method]},
-        tasks=tuple(prefixes),
-        step_limits={1: limit, 2: limit},
-    )
-    episodes = episodes_from_segments(segments, short, quarantine)
-    return episodes.assign(success=(episodes["accomplished"] == episodes["length"]).astype(float))
 
 
 def _rate(

@@ -29,7 +29,7 @@ NOTE = (
 
 def shared_note(spec: RunSpec) -> str:
     """Whose first skills are the same episodes."""
-    shared = [label for name, label in spec.methods.items() if name not in spec.own_first_skill]
+    shared = spec.sharing_first_skills
     return f"{' and '.join(shared)} share their first skills." if len(shared) > 1 else ""
 
 

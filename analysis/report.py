@@ -13,7 +13,7 @@ from analysis.figures import Drawn, draw_figures
 from analysis.files import replaced_folder
 from analysis.models import model_table
 from analysis.page import render_page
-from analysis.pairs import pair_groups, pair_table, second_skills, shown_orders
+from analysis.pairs import both_skills, pair_groups, pair_table, second_skills, shown_orders
 from analysis.profile import profiles
 from analysis.profile_text import profile_markdown
 from analysis.run import Run, load_run
@@ -106,8 +106,9 @@ def _studies(run: Run) -> Studies:
     orders = shown_orders(run.datasets)
     seconds = second_skills(run.segments, run.spec)
     if orders is not None and not seconds.empty:
-        studies["pairs"] = pair_table(seconds, orders, run.spec)
-        studies["pair-groups"] = pair_groups(seconds, orders, run.spec)
+        both = both_skills(run.segments, run.spec, run.quarantine)
+        studies["pairs"] = pair_table(seconds, both, orders, run.spec)
+        studies["pair-groups"] = pair_groups(seconds, both, orders, run.spec)
     beside_table_8 = profiles(run)
     if beside_table_8 is not None:
         studies["profile"] = beside_table_8

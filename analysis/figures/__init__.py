@@ -36,7 +36,9 @@ def draw_figures(run: Run, tables: list[Table], folder: Path) -> list[Drawn]:
             shown = shown_pairs(shown_orders(run.datasets) or [])
             framed = sorted(pair for pair in shown if {*pair} <= {*run.spec.skills})
             save(draw_pairs(run.segments, run.spec, pair, framed), folder, "pairs")
-            drawn.append(Drawn("pairs", PAIRS_CAPTION + (FRAMED if framed else ""), ""))
+            notes = [(FRAMED, framed), (OWN_FIRSTS, run.spec.own_first_skill & {*pair})]
+            caption = PAIRS_CAPTION + "".join(note for note, needed in notes if needed)
+            drawn.append(Drawn("pairs", caption, ""))
         drawn += _diagnosis(run, folder)
         if any(begun(study) for study in run.anatomy.values()):
             save(draw_anatomy(run.anatomy), folder, "anatomy")
@@ -51,6 +53,7 @@ PAIRS_CAPTION = (
     "How often the second skill succeeds once the first has, by ordered pair, over all seeds."
 )
 FRAMED = " Framed: pairs that occur in the data, one right after the other."
+OWN_FIRSTS = " Each method's second skills follow its own first ones, so episodes differ."
 PREDICTIONS_CAPTION = (
     "Predictions of the dynamics on held-out demonstrations. Left: root mean square error over "
     "the distance moved; 1 (dashed) is no better than predicting that nothing moves. Right: the "
