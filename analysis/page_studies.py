@@ -36,11 +36,12 @@ def pairs_section(run: Run, groups: pd.DataFrame | None) -> str:
     header = ["Pairs", "Method", "Second skill succeeds", "Rate", gain, "Both succeed", gain]
     return _note(
         "How often the second skill succeeds once the first has, and how often both do, over all "
-        "episodes. A pair is in the data if its "
-        "skills follow one another in some demonstration. In rates and gains every pair weighs "
-        "the same, and every seed, so a rate may differ a little from successes over trials. "
+        "episodes. A pair is in the data if its skills follow one another in some demonstration. "
+        "In rates and gains every pair weighs the same, and every seed, so a rate may differ a "
+        "little from successes over trials. "
         f"Gains over {baseline} are paired by seed, pair and episode. {_shared_firsts(run)}"
-        "95 % intervals are from resampling seeds, and within a seed each first skill's episodes,  together for all pairs that begin with it; pairs are fixed. "
+        "95 % intervals are from resampling seeds, and within a seed each first skill's episodes, "
+        "together for all pairs that begin with it; pairs are fixed. "
         f"{seed_note(int(groups['seeds'].min()))}"
     ) + html_table(header, lines)
 
@@ -51,8 +52,8 @@ def _shared_firsts(run: Run) -> str:
         return "Methods share their first skills. "
     return (
         "A method that stitches to first skills has its own, so it comes to other second skills "
-        "than another, and from other states: their gain is over those episodes alone in which the "
-        "first skill succeeded under both, and that of both skills says what comes of all. "
+        "than another, and from other states: gains in the second skill are over those episodes "
+        "alone in which the first one succeeded under both methods, gains in both skills over all. "
     )
 
 

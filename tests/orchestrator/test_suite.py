@@ -198,6 +198,19 @@ def test_stitches_taken_apart_are_kept_by_part(done: Path, tmp_path: Path) -> No
     assert renamed["typical_distance"] == {"short:g1": 0.1}
 
 
+def test_parts_may_differ_in_whether_first_skills_are_stitched_to(tmp_path: Path) -> None:
+    suite = lists(tmp_path)
+    stitched, plain = suite.parts
+    rollout = replace(stitched.spec.rollout, first_stitch=True)
+    stitched = replace(stitched, spec=replace(stitched.spec, rollout=rollout))
+    suite = replace(suite, parts=(stitched, plain))
+    own = {m["name"]: m["own_first_skill"] for m in describe_suite(suite)["methods"]}
+    assert own == {"no-stitch": False, "mb-stitch": True}
+    assert Naming(suite, stitched).played_by("mb-stitch") == ["mb-stitch"]
+    assert Naming(suite, stitched).played_by("") == [""]
+    assert Naming(suite, plain).played_by("") == ["", "mb-stitch"]
+
+
 def test_every_part_is_shown_under_the_names_of_the_whole(done: Path, tmp_path: Path) -> None:
     shown = RunDirectory(done / "out").read_json("showcase.json")["parts"]
     assert list(shown) == ["level-1", "level-2"]
