@@ -19,7 +19,6 @@ COLUMNS = [
     "implied_low", "implied_high", "inside",
 ]  # fmt: skip
 
-
 PAPER_TABLES = {"2", "8"}
 """The paper's, whose episodes these bounds are of."""
 
