@@ -5,7 +5,7 @@ tree was played to the longest step limit, and a shorter limit is applied by cut
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +52,30 @@ def episodes_from_segments(
                 tasks = [task for task in part.tasks if task_length(task) == length]
                 frames.append(_play(nodes, method, tasks, prefixes, part))
     return pd.concat(frames, ignore_index=True)
+
+
+def beginnings(
+    segments: pd.DataFrame,
+    spec: RunSpec,
+    method: str,
+    quarantine: Iterable[Mapping[str, Any]] = (),
+) -> pd.DataFrame:
+    """Episodes of a method's first skills and of its first two, as if these were tasks.
+
+    Each beginning of a task once, within the step limit of two skills. COLUMNS and success: 1.0
+    where every skill was accomplished.
+    """
+    walks = [_walk(task) for task in spec.tasks]
+    tasks = dict.fromkeys(walk[depth] for depth in (0, 1) for walk in walks if len(walk) > depth)
+    limit = spec.step_limits.get(2, max(spec.step_limits.values()))
+    short = replace(
+        spec,
+        methods={method: spec.methods[method]},
+        tasks=tuple(tasks),
+        step_limits={1: limit, 2: limit},
+    )
+    episodes = episodes_from_segments(segments, short, quarantine)
+    return episodes.assign(success=(episodes["accomplished"] == episodes["length"]).astype(float))
 
 
 def write_episodes(run_dir: Path) -> pd.DataFrame:

@@ -12,6 +12,8 @@ import pandas as pd
 from analysis.figures import Drawn
 from analysis.page_studies import models_section, pairs_section, stitches_section
 from analysis.page_tables import claims_html, gains_html, html_table, scores_html
+from analysis.profile_text import TITLE as PROFILE_TITLE
+from analysis.profile_text import profile_section
 from analysis.run import Run
 from analysis.skills import permutation_scores, single_skill_rates
 from analysis.tables import Table
@@ -57,6 +59,7 @@ def render_page(
                 if not figure.table and figure.name not in OF_MODELS + OF_STITCHES
             ),
         ),
+        "profile": (PROFILE_TITLE, profile_section(studies.get("profile"), run.spec)),
         "pairs": ("Pairs of skills", pairs_section(run, studies.get("pair-groups"))),
         "models": (
             "Are the models right?",
@@ -166,10 +169,11 @@ def _single_skills(run: Run) -> str:
     rates = single_skill_rates(run.segments, run.spec)
     if rates.empty:
         return ""
+    shared = ", ".join(run.spec.sharing_first_skills) if run.spec.own_first_skill else "all methods"
     lines = [
         [
             run.spec.skill_label(rate["skill"]),
-            run.spec.methods.get(rate["method"], "all methods"),
+            run.spec.methods.get(rate["method"], shared),
             f"{rate['successes']:,} of {rate['trials']:,}",
             f"{rate['rate']:.3f}",
             f"[{rate['low']:.3f}, {rate['high']:.3f}]",

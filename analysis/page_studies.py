@@ -6,7 +6,7 @@ from html import escape
 
 import pandas as pd
 
-from analysis.anatomy import OUTCOMES, WARNINGS
+from analysis.anatomy import FIRST_SKILLS, HAND_OVERS, OUTCOMES, WARNINGS, by_kind, label
 from analysis.page_tables import html_table
 from analysis.pairs import BASELINE, shown_orders
 from analysis.run import Run
@@ -26,18 +26,22 @@ def pairs_section(run: Run, groups: pd.DataFrame | None) -> str:
             run.spec.methods[row["method"]],
             f"{row['successes']:,} of {row['trials']:,}",
             _unbroken(f"{row['rate']:.3f} [{row['ci_low']:.3f}, {row['ci_high']:.3f}]"),
-            _gain(row),
+            _gain(row, "gain"),
+            _unbroken(f"{row['both']:.3f} [{row['both_low']:.3f}, {row['both_high']:.3f}]"),
+            _gain(row, "both_gain"),
         ]
         for row in groups.to_dict("records")
     ]
-    header = ["Pairs", "Method", "Second skill succeeds", "Rate", f"Gain over {baseline}"]
+    gain = f"Gain over {baseline}"
+    header = ["Pairs", "Method", "Second skill succeeds", "Rate", gain, "Both succeed", gain]
     return _note(
-        "How often the second skill succeeds once the first has. A pair is in the data if its "
-        "skills follow one another in some demonstration. In rates and gains every pair weighs "
-        "the same, and every seed, so a rate may differ a little from successes over trials. "
-        f"{_shared_firsts(run)}gains over {baseline} are paired by seed, pair and "
-        "episode. 95 % intervals are from resampling seeds, and within a seed each first skill's "
-        "episodes, together for all pairs that begin with it; pairs are fixed. "
+        "How often the second skill succeeds once the first has, and how often both do, over all "
+        "episodes. A pair is in the data if its skills follow one another in some demonstration. "
+        "In rates and gains every pair weighs the same, and every seed, so a rate may differ a "
+        "little from successes over trials. "
+        f"Gains over {baseline} are paired by seed, pair and episode. {_shared_firsts(run)}"
+        "95 % intervals are from resampling seeds, and within a seed each first skill's episodes, "
+        "together for all pairs that begin with it; pairs are fixed. "
         f"{seed_note(int(groups['seeds'].min()))}"
     ) + html_table(header, lines)
 
@@ -45,17 +49,18 @@ def pairs_section(run: Run, groups: pd.DataFrame | None) -> str:
 def _shared_firsts(run: Run) -> str:
     """Whose first skills the second ones follow."""
     if not run.spec.own_first_skill:
-        return "Methods share their first skills; "
+        return "Methods share their first skills. "
     return (
-        "A method that stitches to first skills has its own, so it may come to other second skills "
-        "than another; "
+        "A method that stitches to first skills has its own, so it comes to other second skills "
+        "than another, and from other states: gains in the second skill are over those episodes "
+        "alone in which the first one succeeded under both methods, gains in both skills over all. "
     )
 
 
-def _gain(row: Record) -> str:
-    if math.isnan(row["gain"]):
+def _gain(row: Record, name: str) -> str:
+    if math.isnan(row[name]):
         return UNKNOWN
-    return _unbroken(f"{row['gain']:+.3f} [{row['gain_low']:+.3f}, {row['gain_high']:+.3f}]")
+    return _unbroken(f"{row[name]:+.3f} [{row[f'{name}_low']:+.3f}, {row[f'{name}_high']:+.3f}]")
 
 
 def _unbroken(text: str) -> str:
@@ -173,17 +178,17 @@ def _dynamics(run: Run, known: Known) -> str:
 
 
 def stitches_section(run: Run, studies: Mapping[str, pd.DataFrame]) -> str:
-    """What stitches did to the second skill, what was expected of them, and what warned."""
+    """What stitches did to the skill they lead to, what was expected of them, and what warned."""
     if "anatomy" not in studies or studies["stitches"].empty:
         return ""
     parts = studies["anatomy"].to_dict("records")
     header = [
-        "Data", "Second skill without", "with a stitch", "Stitches", "Helped", "Hurt",
+        "Stitches to", "Skill succeeds without", "with a stitch", "Stitches", "Helped", "Hurt",
         "Gain predicted", "Gain realised", "ρ", *(f"{name} (AUC)" for name in WARNINGS.values()),
     ]  # fmt: skip
     lines = [
         [
-            row["part"] or "all",
+            label(row["part"], row["kind"]),
             *(f"{row[f'successes_{how}']} of {row['episodes']}" for how in ("without", "with")),
             *(str(row[name]) for name in ("stitches", "helped", "hurt")),
             *(_signed(row[name], 3) for name in ("predicted_gain", "realised_gain")),
@@ -196,26 +201,26 @@ def stitches_section(run: Run, studies: Mapping[str, pd.DataFrame]) -> str:
         html_table(header, lines)
         + _by_outcome(studies["stitches"])
         + _note(
-            "Every ordered pair of skills, or some of them, from where the first one succeeded: "
+            f"{_begun_where(run)}"
             "once without a stitch and once with one, under the same random numbers. A stitch "
-            "helped where the second skill failed without and succeeded with it, and hurt where it "
+            "helped where the skill failed without and succeeded with it, and hurt where it "
             f"was the other way round; these are counts of few episodes ({_tried(run)}) by the "
-            "first seed's models, and no interval goes with them. Gain: of the next skill's value "
+            "first seed's models, and no interval goes with them. Gain: of that skill's value "
             "by a plan's first action, on average; ρ is the rank correlation of predicted with "
             "realised gains. AUC: how likely a stitch that hurt had the higher number of two, one "
             "that hurt and one that did not; 0.5 tells nothing, less is a number that is lower "
             "where stitches hurt. Spreads are those of Eq. 2 at the state predicted for a plan's "
-            "first action, averaged over the stitch; distances are to the next skill's own "
+            "first action, averaged over the stitch; distances are to that skill's own "
             "demonstrations, in standard deviations of the data."
         )
     )
 
 
 def _by_outcome(stitches: pd.DataFrame) -> str:
-    """Means over the stitches of each outcome, by part."""
+    """Means over the stitches of each outcome, by part and kind."""
     lines = [
         [
-            f"{part!s}: {name}" if part else name,
+            f"{label(str(part), str(kind))}: {name}",
             str(len(own)),
             f"{own['steps'].mean():.1f}",
             *(
@@ -225,9 +230,9 @@ def _by_outcome(stitches: pd.DataFrame) -> str:
             f"{own['value_spread'].mean():.3f}",
             f"{own['dynamics_spread'].mean():.4f}",
         ]
-        for part, of_part in stitches.groupby("part", sort=False)
+        for (part, kind), of_kind in stitches.groupby(["part", "kind"], sort=False)
         for name in OUTCOMES.values()
-        if len(own := of_part[of_part["outcome"] == name])
+        if len(own := of_kind[of_kind["outcome"] == name])
     ]
     header = [
         "The stitch", "Stitches", "Steps", "Value", "Distance to data", "Spread of values",
@@ -237,10 +242,20 @@ def _by_outcome(stitches: pd.DataFrame) -> str:
 
 
 def _tried(run: Run) -> str:
-    """ "20 pairs, 6 episodes of each" """
+    """ "7 first skills and 20 pairs, 6 episodes of each" """
     study = max(run.anatomy.values(), key=lambda one: len(one["pairs"]))
-    pairs = len(study["pairs"])
-    return f"{pairs} pair{'s'[: pairs != 1]}, {study['episodes']} episodes of each"
+    counts = {kind: len(own["pairs"]) for kind, own in by_kind(study).items()}
+    words = {FIRST_SKILLS: "first skill", HAND_OVERS: "pair"}
+    tried = [f"{count} {words[kind]}{'s'[: count != 1]}" for kind, count in counts.items()]
+    return f"{' and '.join(tried)}, {study['episodes']} episodes of each"
+
+
+def _begun_where(run: Run) -> str:
+    first = any(FIRST_SKILLS in by_kind(study) for study in run.anatomy.values())
+    return (
+        f"{'Every first skill from the start of an episode, and every' if first else 'Every'} "
+        "ordered pair of skills, or some of them, from where No-Stitch's first one succeeded: "
+    )
 
 
 def _signed(number: float, digits: int) -> str:

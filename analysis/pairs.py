@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from analysis.episodes import beginnings
 from analysis.run import SEPARATOR, RunSpec
-from analysis.statistics import arrange, estimate, generator, paired_gain
+from analysis.statistics import Estimate, Gain, arrange, estimate, generator, paired_gain
 
 BASELINE = "no-stitch"
 IN_DATA, OTHER, ALL = "pairs in the data", "other pairs", "all pairs"
@@ -53,11 +54,41 @@ def second_skills(segments: pd.DataFrame, spec: RunSpec) -> pd.DataFrame:
     )
 
 
-def pair_table(seconds: pd.DataFrame, orders: Orders, spec: RunSpec) -> pd.DataFrame:
-    """Columns first, second, in_data, method, successes, trials, rate; in the spec's order."""
+def both_skills(
+    segments: pd.DataFrame, spec: RunSpec, quarantine: Iterable[Mapping[str, Any]] = ()
+) -> pd.DataFrame:
+    """One row for every episode of a pair of skills, whether or not the first one succeeded.
+
+    Columns seed, method, task, first, second, episode, length, accomplished: 1 where both
+    succeeded, of 1. Methods with first skills of their own are compared by these.
+    """
+    played = pd.concat(
+        [beginnings(segments, spec, method, quarantine) for method in spec.methods],
+        ignore_index=True,
+    )
+    pairs = played[played["length"] == 2]
+    skills = pairs["task"].str.split(SEPARATOR)
+    return pairs[["seed", "method", "task", "episode"]].assign(
+        first=skills.str[0],
+        second=skills.str[-1],
+        length=1,
+        accomplished=pairs["success"].astype(int),
+    )
+
+
+def pair_table(
+    seconds: pd.DataFrame, both: pd.DataFrame, orders: Orders, spec: RunSpec
+) -> pd.DataFrame:
+    """Columns first, second, in_data, method, successes, trials, rate, episodes, both.
+
+    rate: of the second skill once the first has succeeded; both: of both, over all episodes. In
+    the spec's order.
+    """
     shown = shown_pairs(orders)
-    grouped = seconds.groupby(["first", "second", "method"])["success"]
-    counts = {pair: (int(part.sum()), len(part)) for pair, part in grouped}
+    key = ["first", "second", "method"]
+    counts = {pair: (int(part.sum()), len(part)) for pair, part in seconds.groupby(key)["success"]}
+    wholes = {pair: (len(part), part.mean()) for pair, part in both.groupby(key)["accomplished"]}
+    unknown = 0, np.nan
     records = [
         (first, second, (first, second) in shown, method, *counts[first, second, method])
         for first in spec.skills
@@ -67,42 +98,58 @@ def pair_table(seconds: pd.DataFrame, orders: Orders, spec: RunSpec) -> pd.DataF
     ]
     columns = ["first", "second", "in_data", "method", "successes", "trials"]
     table = pd.DataFrame(records, columns=columns)
-    return table.assign(rate=table["successes"] / table["trials"])
+    table["rate"] = table["successes"] / table["trials"]
+    known = [wholes.get(pair, unknown) for pair in table[key].itertuples(index=False, name=None)]
+    table[["episodes", "both"]] = pd.DataFrame(known, columns=["episodes", "both"])
+    return table
 
 
-def pair_groups(seconds: pd.DataFrame, orders: Orders, spec: RunSpec) -> pd.DataFrame:
+def pair_groups(
+    seconds: pd.DataFrame, both: pd.DataFrame, orders: Orders, spec: RunSpec
+) -> pd.DataFrame:
     """How often second skills succeed, by group of pairs and method.
 
     Columns group, method, pairs, successes, trials, rate, ci_low, ci_high, gain, gain_low,
-    gain_high, seeds. In rates and gains every pair weighs the same, and every seed. The gain is
-    over No-Stitch, paired over the episodes both played; intervals are of 95 % and take
-    the pairs as fixed (see `analysis.statistics.bootstrap_means`).
+    gain_high, seeds: of second skills once the first has succeeded. The gain is over No-Stitch,
+    paired over the second skills that both played: those whose first skill, each method's own,
+    succeeded under both. Then both, both_low, both_high, both_gain, both_gain_low, both_gain_high:
+    that both skills succeed, over all episodes. In rates and gains every pair weighs the same, and
+    every seed; intervals are of 95 % and take the pairs as fixed (see
+    `analysis.statistics.bootstrap_means`).
     """
     shown = shown_pairs(orders)
-    known = np.array(
-        [pair in shown for pair in zip(seconds["first"], seconds["second"], strict=True)], bool
-    )
     records = []
-    for group, chosen in {IN_DATA: known, OTHER: ~known, ALL: known | ~known}.items():
-        members = seconds[chosen]
+    for group in (IN_DATA, OTHER, ALL):
+        members, wholes = (_of_group(frame, group, shown) for frame in (seconds, both))
         for method in spec.methods:
             part = members[members["method"] == method]
-            if not part.empty:
-                records.append((group, method, *_group_numbers(part, members, group, method)))
+            if part.empty:
+                continue
+            ours, gain = _numbers(members, method, "pairs", group)
+            whole, whole_gain = _numbers(wholes, method, "both skills of pairs", group)
+            records.append(
+                (group, method, part["task"].nunique(), int(part["success"].sum()), len(part),
+                 ours.mean, ours.low, ours.high, gain.difference, gain.low, gain.high, ours.seeds,
+                 whole.mean, whole.low, whole.high, whole_gain.difference, whole_gain.low,
+                 whole_gain.high)
+            )  # fmt: skip
     columns = [
         "group", "method", "pairs", "successes", "trials", "rate", "ci_low", "ci_high",
         "gain", "gain_low", "gain_high", "seeds",
+        "both", "both_low", "both_high", "both_gain", "both_gain_low", "both_gain_high",
     ]  # fmt: skip
     return pd.DataFrame(records, columns=columns)
 
 
-def _group_numbers(
-    part: pd.DataFrame, members: pd.DataFrame, group: str, method: str
-) -> tuple[float, ...]:
-    rate = estimate(arrange(part, "accomplished"), generator("pairs", group, method))
+def _of_group(frame: pd.DataFrame, group: str, shown: set[tuple[str, str]]) -> pd.DataFrame:
+    pairs = zip(frame["first"], frame["second"], strict=True)
+    known = np.array([pair in shown for pair in pairs], bool)
+    return frame[{IN_DATA: known, OTHER: ~known, ALL: known | ~known}[group]]
+
+
+def _numbers(members: pd.DataFrame, method: str, what: str, group: str) -> tuple[Estimate, Gain]:
+    """The mean of what a method accomplished, and its gain over the baseline."""
+    part = members[members["method"] == method]
+    rate = estimate(arrange(part, "accomplished"), generator(what, group, method))
     others = members[members["method"] == (BASELINE if method != BASELINE else None)]
-    gain = paired_gain(part, others, generator("pairs gain", group, method))
-    return (
-        part["task"].nunique(), int(part["success"].sum()), len(part), rate.mean, rate.low,
-        rate.high, gain.difference, gain.low, gain.high, rate.seeds,
-    )  # fmt: skip
+    return rate, paired_gain(part, others, generator(f"{what} gain", group, method))

@@ -13,7 +13,9 @@ from analysis.figures import Drawn, draw_figures
 from analysis.files import replaced_folder
 from analysis.models import model_table
 from analysis.page import render_page
-from analysis.pairs import pair_groups, pair_table, second_skills, shown_orders
+from analysis.pairs import both_skills, pair_groups, pair_table, second_skills, shown_orders
+from analysis.profile import profiles
+from analysis.profile_text import profile_markdown
 from analysis.run import Run, load_run
 from analysis.skills import permutation_scores
 from analysis.tables import Table, build_table
@@ -60,7 +62,12 @@ def _copy_table(
         f"{name}-gains.csv": "gains.csv",
         f"{name}.md": "table.md",
         f"{name}.tex": "table.tex",
-        **{f"{study}.csv": f"{study}.csv" for study in studies},
+        **{
+            file.name: file.name
+            for study in studies
+            for file in (report / f"{study}.csv", report / f"{study}.md")
+            if file.is_file()
+        },
     }.items():
         shutil.copyfile(report / source, folder / target)
     (folder / "figures").mkdir()
@@ -86,6 +93,8 @@ def _build(run_dir: Path) -> tuple[list[Table], Studies, list[Drawn]]:
         _write(report / "permutations.csv", to_csv(permutation_scores(episodes, run.spec)))
         for name, study in studies.items():
             _write(report / f"{name}.csv", to_csv(study))
+        if "profile" in studies:
+            _write(report / "profile.md", profile_markdown(studies["profile"], run.spec))
         page = render_page(run, episodes, tables, studies, drawn, report / "figures")
         _write(report / "index.html", page)
     return tables, studies, drawn
@@ -97,8 +106,12 @@ def _studies(run: Run) -> Studies:
     orders = shown_orders(run.datasets)
     seconds = second_skills(run.segments, run.spec)
     if orders is not None and not seconds.empty:
-        studies["pairs"] = pair_table(seconds, orders, run.spec)
-        studies["pair-groups"] = pair_groups(seconds, orders, run.spec)
+        both = both_skills(run.segments, run.spec, run.quarantine)
+        studies["pairs"] = pair_table(seconds, both, orders, run.spec)
+        studies["pair-groups"] = pair_groups(seconds, both, orders, run.spec)
+    beside_table_8 = profiles(run)
+    if beside_table_8 is not None:
+        studies["profile"] = beside_table_8
     if run.diagnosis:
         studies["models"] = model_table(run)
     if run.anatomy:

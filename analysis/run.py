@@ -118,6 +118,11 @@ class RunSpec:
             for part in self.parts
         ] or [self]
 
+    @property
+    def sharing_first_skills(self) -> list[str]:
+        """Labels of the methods whose first skills are the same episodes, under method ""."""
+        return [label for name, label in self.methods.items() if name not in self.own_first_skill]
+
     def skill_label(self, skill: str) -> str:
         """The name a skill goes by in tables: "bottom-burner" -> "bottom burner"."""
         return self.skill_labels.get(skill) or plain_label(skill)

@@ -9,8 +9,9 @@ from analysis.statistics import wilson
 def single_skill_rates(segments: pd.DataFrame, spec: RunSpec) -> pd.DataFrame:
     """How often each skill succeeds from the start of an episode, over all seeds.
 
-    Columns skill, method ("" where all methods share it), successes, trials, rate, low, high;
-    the interval is Wilson's, which takes episodes as independent and knows nothing of seeds.
+    Columns skill, method ("" for those that share their first skills), successes, trials, rate,
+    low, high; the interval is Wilson's, which takes episodes as independent and knows nothing of
+    seeds.
     """
     first = segments[segments["depth"] == 1]
     counts = first.groupby(["method", "prefix"])["success"].agg(successes="sum", trials="count")

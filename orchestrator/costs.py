@@ -25,7 +25,7 @@ class Estimate:
     """What is there, what is missing, and what the missing will take at most."""
 
     artifacts: dict[str, tuple[int, int]]  # kind → found, missing
-    blocks: dict[str, dict[Standing, int]]  # method ("" for first skills) → counts
+    blocks: dict[str, dict[Standing, int]]  # method ("": first skills that are shared) → counts
     episodes: int  # of the finished tables: tasks × methods × seeds × episodes
     segments_missing: int  # expected
     segments_in_tree: int

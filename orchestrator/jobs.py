@@ -32,8 +32,8 @@ class BlockTask:
     benchmark: str
     root_seed: int
     seed: int
-    method: str  # "" for first skills
-    stitcher: Plain  # the method's configuration; empty for first skills
+    method: str  # "" for first skills that are not stitched to
+    stitcher: Plain  # the method's configuration; empty where that is ""
     prefix: tuple[str, ...]
     episodes: tuple[int, int]  # first and one past the last, of the whole block
     step_limit: int

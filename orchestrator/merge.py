@@ -48,10 +48,22 @@ class Naming:
 
     def played_by(self, method: str) -> list[str]:
         """The merged methods of a part's segment or block; "" is all that share first skills."""
-        if method or not self.suite.by_variant:
-            return [self.method(method) if method else ""]
+        if method:
+            return [self.method(method)]
         spec = self.part.spec
-        return [self.method(m) for m in spec.methods if not first_method(m, spec.rollout)]
+        shared = [m for m in spec.methods if not first_method(m, spec.rollout)]
+        if self.suite.by_variant:
+            return [self.method(m) for m in shared]
+        # What has first skills of its own in another part cannot share them here.
+        return ["", *(m for m in shared if has_own_first_skill(self.suite, m))]
+
+
+def has_own_first_skill(suite: Suite, method: str) -> bool:
+    """Whether a method, as parts call it, has first skills that it shares with no other."""
+    return suite.by_variant or any(
+        method in part.spec.methods and first_method(method, part.spec.rollout)
+        for part in suite.parts
+    )
 
 
 def describe_suite(suite: Suite) -> Plain:
@@ -74,8 +86,7 @@ def describe_suite(suite: Suite) -> Plain:
                 (name := Naming(suite, part).method(method)): {
                     "name": name,
                     "label": Naming(suite, part).label(method),
-                    "own_first_skill": suite.by_variant
-                    or bool(first_method(method, part.spec.rollout)),
+                    "own_first_skill": has_own_first_skill(suite, method),
                 }
                 for part in suite.parts
                 for method in part.spec.methods
@@ -201,7 +212,11 @@ def anatomy_of_part(study: Plain, naming: Naming) -> Plain:
     """Stitches of a part, between skills as they are called where all parts meet."""
 
     def renamed(entry: Plain) -> Plain:
-        return entry | {name: naming.skill(entry[name]) for name in ("first", "second")}
+        first, second = entry["first"], entry["second"]  # nothing comes before a first skill
+        return entry | {
+            "first": naming.skill(first) if first else first,
+            "second": naming.skill(second),
+        }
 
     typical = study["typical_distance"].items()
     return study | {

@@ -30,6 +30,8 @@ def plan_lines(spec: Spec, costs: Estimate, workers: int | None) -> Iterator[str
         yield f"  {kind:<20} {found:>5}  {missing:>7}"
     yield "blocks                 found  missing  decided without playing"
     for method in ("", *spec.methods):
+        if not method and method not in costs.blocks:
+            continue  # every method stitches to first skills, and has its own
         label = method_label(method) if method else "first skills, shared"
         counts = costs.blocks.get(method, {})
         found, missing, decided = (counts.get(s, 0) for s in ("found", "missing", "decided"))

@@ -1,7 +1,8 @@
 """Stitches taken apart: what was planned and what came of it, step by step, and whether it helped.
 
-Each pair of skills goes on twice from the states in which the first one ended, without a stitch and
-with MB-Stitch: so of every stitch it is known what would have happened without it.
+Each pair of skills goes on twice from the states in which No-Stitch's first one ended, without a
+stitch and with MB-Stitch: so of every stitch it is known what would have happened without it. Where
+Algorithm 1 stitches before a task's first skill, too, each of these is played twice from the start.
 """
 
 from __future__ import annotations
@@ -19,14 +20,16 @@ from torch import Tensor
 from stitching.data.transitions import Transitions
 from stitching.envs.protocol import ActionSpace, Benchmark, EpisodeBlock
 from stitching.models.agent import Agent
-from stitching.models.dynamics import Dynamics
 from stitching.planning.objective import NORMS, spread_over_members
 from stitching.planning.protocol import Plan, Planner, Score
 from stitching.rollout import Play, Recorder, RolloutConfig, Segments, begin, play_segment
 from stitching.stitchers import MBStitch, NoStitch, Proposal, Stitcher
+from stitching.surroundings import Surroundings
 
-SAMPLED_STATES = 200  # of a skill's demonstrations, to say how near to one another they are
 DIGITS = 5  # after the point, of what is recorded
+
+START = ""
+"""In the place of a pair's first skill: there is none, an episode starts."""
 
 Pair = tuple[str, str]  # two skills, in their order
 Numbers = dict[str, float]
@@ -58,7 +61,7 @@ class Subject:
             self._block, self.agent, stitcher, self.benchmark, self.rollout, play, budget, recorder
         )
 
-    def boundary(self, play: Play, snapshots: np.ndarray) -> Tensor:
+    def boundary(self, play: Play, snapshots: np.ndarray | None) -> Tensor:
         """What such a segment begins with: (n, observation)."""
         begin(self._block, play, snapshots)
         return torch.from_numpy(self._block.observe(np.arange(len(play.episodes))))
@@ -73,48 +76,6 @@ class Subject:
     def play(self, method: str, episodes: Sequence[int], *prefix: str) -> Play:
         name = self.benchmark.name
         return Play(self.root_seed, name, self.seed, method, tuple(episodes), prefix)
-
-
-@dataclass(frozen=True)
-class Surroundings:
-    """The states in which one skill was demonstrated, and how far from them others are.
-
-    Distances are Euclidean, every dimension in units of its standard deviation in the data, over
-    the square root of their number: 1 is one standard deviation in every dimension.
-    """
-
-    states: Tensor  # (N, observation), in those units
-    demonstrations: Tensor  # (N,) int64, which of them each state is of
-
-    @classmethod
-    def of(cls, data: Transitions, skill: int, dynamics: Dynamics) -> Surroundings:
-        rows = data.episode_rows(skill)
-        numbers = np.repeat(np.arange(len(rows)), [len(each) for each in rows])
-        chosen = np.concatenate([np.empty(0, dtype=np.int64), *rows])
-        states = dynamics.scaled(torch.from_numpy(data.observations[chosen]))
-        return cls(states, torch.from_numpy(numbers))
-
-    def distances(self, states: Tensor) -> Tensor:
-        """To the nearest demonstrated state: (n, observation), in the data's units → (n,)."""
-        return self._gaps(states).amin(dim=1)
-
-    def typical(self) -> float | None:
-        """Median distance of a demonstrated state to the nearest one of another demonstration.
-
-        None where there is but one. Of at most 200 states, evenly chosen.
-        """
-        if self.demonstrations.unique().numel() < 2:
-            return None
-        count = len(self.states)
-        shown = torch.linspace(0, count - 1, min(SAMPLED_STATES, count)).long()
-        same = self.demonstrations[shown][:, None] == self.demonstrations
-        gaps = self._gaps(self.states[shown]).masked_fill(same, torch.inf)
-        return round(float(gaps.amin(dim=1).median()), DIGITS)
-
-    def _gaps(self, states: Tensor) -> Tensor:
-        """(n, observation) → (n, N). Without the matrix product, which is inexact near zero."""
-        exact = "donot_use_mm_for_euclid_dist"
-        return torch.cdist(states, self.states, compute_mode=exact) / states.shape[1] ** 0.5
 
 
 @dataclass
@@ -228,54 +189,80 @@ def anatomy(
 ) -> dict[str, Any]:
     """The first `episodes` episodes of every pair of skills, with and without MB-Stitch, as JSON.
 
-    "pairs" tells how many of them came to a stitch; "stitches" has one entry for each of these,
-    with the outcome of the second skill both ways; "typical_distance" says by skill how near to one
-    another demonstrations are. data: what the skills were learned from.
+    Where first skills are stitched to, too, those of the pairs are played both ways from the start
+    of an episode, as pairs whose "first" is START. "pairs" tells how many episodes came to each
+    stitch; "stitches" has one entry for each of these, with the outcome of the second skill both
+    ways; "typical_distance" says by skill how near to one another demonstrations are.
+    data: what the skills were learned from.
     """
     dynamics = subject.stitcher.dynamics
-    firsts = {skill: _first(subject, skill, episodes) for skill in sorted({a for a, _ in pairs})}
+    ends = {skill: _end_of(subject, skill, episodes) for skill in sorted({a for a, _ in pairs})}
+    places = {pair: ends[pair[0]] for pair in pairs}
+    if subject.rollout.first_stitch:
+        start = Boundary(range(episodes), None, np.full(episodes, subject.step_limit))
+        places = {(START, skill): start for skill in ends} | places
     near = {
         skill: Surroundings.of(data, subject.number(skill), dynamics)
-        for skill in sorted({second for _, second in pairs})
+        for skill in sorted({second for _, second in places})
     }
-    stitches: list[dict[str, Any]] = []
-    for pair in pairs:
-        if firsts[pair[0]].success.any():
-            stitches += _stitches(subject, near[pair[1]], firsts[pair[0]], pair)
+    typical = {skill: around.typical() for skill, around in near.items()}
     return {
         "episodes": episodes,
         "limit": subject.stitcher.limit,
         "alpha": subject.stitcher.alpha,
         "beta": subject.stitcher.beta,
-        "typical_distance": {skill: around.typical() for skill, around in near.items()},
+        "typical_distance": {
+            skill: None if distance is None else round(distance, DIGITS)
+            for skill, distance in typical.items()
+        },
         "pairs": [
-            {"first": first, "second": second, "arrived": int(firsts[first].success.sum())}
-            for first, second in pairs
+            {"first": first, "second": second, "arrived": len(place.episodes)}
+            for (first, second), place in places.items()
         ],
-        "stitches": stitches,
+        "stitches": [
+            stitch
+            for pair, place in places.items()
+            if place.episodes
+            for stitch in _both_ways(subject, near[pair[1]], pair, place)
+        ],
     }
 
 
-def _first(subject: Subject, skill: str, episodes: int) -> Segments:
-    """A first skill, which is the same for every method."""
+@dataclass(frozen=True)
+class Boundary:
+    """Where n episodes stand before a skill."""
+
+    episodes: Sequence[int]  # their numbers
+    snapshots: np.ndarray | None  # (n, snapshot); None: at the start
+    budget: np.ndarray  # (n,) steps that are left
+
+
+def _end_of(subject: Subject, skill: str, episodes: int) -> Boundary:
+    """Where No-Stitch's first skill succeeded."""
     budget = np.full(episodes, subject.step_limit)
-    return subject.segment(subject.play("", range(episodes), skill), None, NoStitch(), budget)
+    first = subject.segment(subject.play("", range(episodes), skill), None, NoStitch(), budget)
+    succeeded = np.flatnonzero(first.success)
+    return Boundary(
+        succeeded.tolist(), first.snapshots[succeeded], (budget - first.steps)[succeeded]
+    )
 
 
-def _stitches(
-    subject: Subject, near: Surroundings, first: Segments, pair: Pair
+def _both_ways(
+    subject: Subject, near: Surroundings, pair: Pair, place: Boundary
 ) -> list[dict[str, Any]]:
-    """Every episode in which the first skill succeeded, both ways from there."""
-    episodes = np.flatnonzero(first.success).tolist()
-    snapshots = first.snapshots[first.success]
-    budget = subject.step_limit - first.steps[first.success]
+    """Every episode that stands before the pair's second skill, without and with a stitch."""
+    prefix = [skill for skill in pair if skill != START]
     plain = subject.segment(
-        subject.play("no-stitch", episodes, *pair), snapshots, NoStitch(), budget
+        subject.play("no-stitch", place.episodes, *prefix),
+        place.snapshots,
+        NoStitch(),
+        place.budget,
     )
     witness = Witness(subject, near)
-    play = subject.play("mb-stitch", episodes, *pair)
-    witness.look(subject.boundary(play, snapshots), episodes, subject.number(pair[1]))
-    stitched = subject.segment(play, snapshots, witness, budget, witness)
+    play = subject.play("mb-stitch", place.episodes, *prefix)
+    before = subject.boundary(play, place.snapshots)
+    witness.look(before, place.episodes, subject.number(pair[1]))
+    stitched = subject.segment(play, place.snapshots, witness, place.budget, witness)
     return [
         {
             "first": pair[0],
@@ -287,5 +274,5 @@ def _stitches(
             "steps_with": int(stitched.steps[row]),
             **witness.traces[episode].as_plain(),
         }
-        for row, episode in enumerate(episodes)
+        for row, episode in enumerate(place.episodes)
     ]

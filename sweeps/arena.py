@@ -25,6 +25,9 @@ from orchestrator.rundir import describe
 from orchestrator.spec import Spec
 from orchestrator.store import Artifact, Store
 
+SHARED = "first skills, shared"
+"""Segments of no one method; a first skill that is stitched to is of the method that does."""
+
 
 @dataclass(frozen=True)
 class Played:
@@ -73,7 +76,7 @@ class Tally:
         if isinstance(report.job, BuildJob):
             self.built[report.job.recipe.kind] += report.artifact is not None
         elif isinstance(report.job, PlayJob):
-            kinds = {task.key: task.method or "first skills" for task, _ in report.job.tasks}
+            kinds = {task.key: task.method or SHARED for task, _ in report.job.tasks}
             for block in report.blocks:
                 if block.outcome is not None:
                     kind = kinds[block.key]

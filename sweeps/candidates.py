@@ -15,7 +15,7 @@ NO_STITCH = "no-stitch"
 
 @dataclass(frozen=True)
 class Group:
-    """Candidates that share models, and so first skills; one spec plays them all."""
+    """Candidates that share models, and first skills not stitched to; one spec plays them all."""
 
     spec: Spec
     methods: dict[int, str]  # place of the candidate → its method in this spec

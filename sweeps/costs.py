@@ -8,6 +8,7 @@ from pathlib import Path
 
 from orchestrator.costs import Estimate, estimate
 from orchestrator.ledger import Ledger
+from orchestrator.methods import first_method
 from orchestrator.plan import make_plan
 from orchestrator.spec import Spec
 from orchestrator.store import Store
@@ -27,10 +28,12 @@ def plan_lines(sweep: SweepSpec, store: Path) -> Iterator[str]:
     )
     needed = make_plan(replace(spec, methods=(NO_STITCH, "mb-stitch"))).needed
     kinds = {r.kind for k, r in make_plan(spec).recipes.items() if k in needed}
+    own = first_method("mb-stitch", spec.rollout)
+    firsts = "No-Stitch's first skills" if own else "first skills"
     artifacts = [count for kind, count in one.artifacts.items() if kind in kinds]
     yield (
         f"  shared by all trials: {_found(*map(sum, zip(*artifacts, strict=True)))} artifacts, "
-        f"{_blocks(shared, '')} of first skills, {_blocks(shared, NO_STITCH)} of No-Stitch"
+        f"{_blocks(shared, '')} of {firsts}, {_blocks(shared, NO_STITCH)} of No-Stitch"
     )
     yield (
         f"  a trial: at most {sum(one.blocks.get('mb-stitch', {}).values())} blocks; the base's "

@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.statistics import Gain, generator, paired_differences, paired_gain
-from orchestrator.methods import MBStitchConfig
+from orchestrator.methods import MBStitchConfig, first_method
 from orchestrator.spec import Spec
 from orchestrator.structure import Plain
 from sweeps.arena import Arena, Played
@@ -31,9 +31,10 @@ class Showing:
 
     method: str
     config: MBStitchConfig
-    segments: pd.DataFrame  # its own, first skills left out
+    segments: pd.DataFrame  # its own: of first skills only those that it stitches to
     episodes: pd.DataFrame
     baseline: pd.DataFrame  # No-Stitch's episodes
+    own_first_skill: bool = False  # it stitches to first skills
 
     def gain_over(self, other: pd.DataFrame, *names: str) -> Gain:
         """Paired by seed, task and episode; the interval's draws belong to these names."""
@@ -80,11 +81,13 @@ class Showing:
     def instances(self, places: dict[tuple[str, int], int]) -> dict[int, float]:
         """Place of a (task, episode) → its paired gain over No-Stitch, mean over seeds.
 
-        Episodes whose first skill failed are left out: no method could have differed there.
+        Where candidates share first skills, episodes in which these failed are left out: nothing
+        could have differed there.
         """
         key = ["seed", "task", "episode"]
         pairs = self.episodes.merge(self.baseline, on=key, suffixes=("", "_baseline"))
-        pairs = pairs[(pairs["accomplished"] > 0) | (pairs["accomplished_baseline"] > 0)].copy()
+        begun = (pairs["accomplished"] > 0) | (pairs["accomplished_baseline"] > 0)
+        pairs = pairs[begun | self.own_first_skill].copy()
         pairs["gain"] = (pairs["accomplished"] - pairs["accomplished_baseline"]) / pairs["length"]
         means = pairs[["task", "episode", "gain"]].groupby(["task", "episode"]).mean().reset_index()
         return {
@@ -112,7 +115,12 @@ def _showing(played: Played, spec: Spec, method: str, baseline: pd.DataFrame) ->
     config = spec.method_config(method)
     assert isinstance(config, MBStitchConfig)
     return Showing(
-        method, config, _of(played.segments, method), _of(played.episodes, method), baseline
+        method,
+        config,
+        _of(played.segments, method),
+        _of(played.episodes, method),
+        baseline,
+        own_first_skill=bool(first_method(method, spec.rollout)),
     )
 
 

@@ -36,7 +36,9 @@ def draw_figures(run: Run, tables: list[Table], folder: Path) -> list[Drawn]:
             shown = shown_pairs(shown_orders(run.datasets) or [])
             framed = sorted(pair for pair in shown if {*pair} <= {*run.spec.skills})
             save(draw_pairs(run.segments, run.spec, pair, framed), folder, "pairs")
-            drawn.append(Drawn("pairs", PAIRS_CAPTION + (FRAMED if framed else ""), ""))
+            notes = [(FRAMED, framed), (OWN_FIRSTS, run.spec.own_first_skill & {*pair})]
+            caption = PAIRS_CAPTION + "".join(note for note, needed in notes if needed)
+            drawn.append(Drawn("pairs", caption, ""))
         drawn += _diagnosis(run, folder)
         if any(begun(study) for study in run.anatomy.values()):
             save(draw_anatomy(run.anatomy), folder, "anatomy")
@@ -51,6 +53,7 @@ PAIRS_CAPTION = (
     "How often the second skill succeeds once the first has, by ordered pair, over all seeds."
 )
 FRAMED = " Framed: pairs that occur in the data, one right after the other."
+OWN_FIRSTS = " Each method's second skills follow its own first ones, so episodes differ."
 PREDICTIONS_CAPTION = (
     "Predictions of the dynamics on held-out demonstrations. Left: root mean square error over "
     "the distance moved; 1 (dashed) is no better than predicting that nothing moves. Right: the "
@@ -64,9 +67,10 @@ VALUE_CURVES_CAPTION = (
 
 ANATOMY_CAPTION = (
     "Stitches of the first seed's models, coloured by what came of them: each episode was also "
-    "played on from the same state without a stitch. From left to right: the next skill's value, "
-    "ensemble mean, along each stitch; distance to the nearest state of that skill's own "
-    "demonstrations (1: one standard deviation in every number of the state), above the dashed "
+    "played on from the same state without a stitch. Stitches to a task's first skill, where there "
+    "are any, and those between two skills have a row each. From left to right: the value of the "
+    "skill to come, ensemble mean, along each stitch; distance to the nearest of that skill's own "
+    "demonstrated states (1: one standard deviation in every number of them), above the dashed "
     "line the stitch led away from them, dotted how near demonstrations are to one another; what "
     "each plan's first action was to gain in value and did, below the dashed line less than "
     "predicted; and how much the value members and the dynamics members disagreed about the state "

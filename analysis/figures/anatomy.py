@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from analysis.anatomy import begun, gains, outcome
+from analysis.anatomy import Study, begun, gains, label, of_parts, outcome
 from analysis.figures.style import COLOURS, FAINT, INK, new_figure
 
 BLUE, _, GREEN, RED, _, _, GREY = COLOURS
@@ -20,22 +20,19 @@ LOOKS = {
 }
 ORDER = ("failed either way", "succeeded either way", "helped", "hurt")  # on top at last
 
-Study = Mapping[str, Any]
-
 
 def draw_anatomy(studies: Mapping[str, Study]) -> Figure:
-    """A row of four panels for each part of a run that has any stitches."""
-    shown = {part: study for part, study in studies.items() if begun(study)}
+    """A row of four panels for each part and kind of stitches that has any."""
+    shown = {label(part, kind): study for part, kind, study in of_parts(studies) if begun(study)}
     figure = new_figure(12.4, 0.6 + 3.0 * len(shown))
     grid = figure.subplots(len(shown), len(PANELS), squeeze=False)
-    for row, (part, study) in zip(grid, shown.items(), strict=True):
+    for row, (name, study) in zip(grid, shown.items(), strict=True):
         for axes, (title, draw) in zip(row, PANELS.items(), strict=True):
             axes.grid(color=FAINT, lw=0.4)
             axes.set_axisbelow(True)
             axes.set_title(title)
             draw(axes, study)
-        if part:
-            row[0].set_ylabel(f"{part}\n{row[0].get_ylabel()}")
+        row[0].set_ylabel(f"{name}\n{row[0].get_ylabel()}")
     _legend(figure, shown)
     return figure
 
@@ -63,7 +60,7 @@ def _values(axes: Axes, study: Study) -> None:
             axes.plot(value, color=colour, lw=0.9, alpha=0.6)
             axes.plot(len(value) - 1, value[-1], marker, color=colour, ms=4.5, alpha=0.8)
     axes.set_xlabel("stitching step")
-    axes.set_ylabel("value of the next skill")
+    axes.set_ylabel("value of the skill to come")
 
 
 def _scatter(axes: Axes, study: Study, points: Callable[[Any], np.ndarray]) -> None:
@@ -118,7 +115,7 @@ def _same_limits(axes: Axes, *, from_zero: bool = False) -> None:
 
 PANELS: dict[str, Callable[[Axes, Study], None]] = {
     "value along each stitch": _values,
-    "distance to the next skill's data": _distances,
+    "distance to that skill's data": _distances,
     "gain in value by one action": _gains,
     "the two variances of Eq. 2": _variances,
 }

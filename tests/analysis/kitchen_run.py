@@ -111,6 +111,16 @@ def kitchen_anatomy() -> dict[str, Any]:
     }
 
 
+def kitchen_first_skills() -> dict[str, Any]:
+    """The same, with stitches to first skills: two that hurt."""
+    study = kitchen_anatomy()
+    firsts = [kitchen_stitch(episode, True, False, -1.0) | {"first": ""} for episode in (0, 1)]
+    return study | {
+        "pairs": [{"first": "", "second": "kettle", "arrived": 2}, *study["pairs"]],
+        "stitches": [*firsts, *study["stitches"]],
+    }
+
+
 def kitchen_files() -> dict[str, Any]:
     """Everything beside the segments, by the name of its JSON file."""
     curve = np.linspace(-5, 0, 21).tolist()

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.anatomy import anatomy_table, gains, outcome, stitch_table
+from analysis.anatomy import FIRST_SKILLS, HAND_OVERS, anatomy_table, gains, outcome, stitch_table
 from analysis.figures.anatomy import draw_anatomy
 from analysis.figures.style import house_style
 from analysis.page_studies import stitches_section
 from analysis.run import Run, load_run
-from tests.analysis.kitchen_run import kitchen_anatomy, write_kitchen
+from tests.analysis.kitchen_run import kitchen_anatomy, kitchen_first_skills, write_kitchen
 
 
 @pytest.fixture(params=["alone", "merged"])
@@ -68,9 +68,30 @@ def test_the_page_has_a_line_for_each_part_and_outcome(run: Run) -> None:
     assert "2 of 4" in html
     assert "1 pair, 5 episodes of each" in html
     for part in run.anatomy:
-        assert f'<th scope="row">{part or "all"}</th>' in html
+        name = f"{part}: {HAND_OVERS}" if part else HAND_OVERS
+        assert f'<th scope="row">{name}</th>' in html
+    assert "from the start" not in html
     assert "failed either way</th>" not in html
     assert "-9.00 → -11.00" in html
+
+
+def test_first_skills_and_hand_overs_are_told_apart(tmp_path: Path, write_run: Any) -> None:
+    study = kitchen_first_skills()
+    run = load_run(write_kitchen(write_run, tmp_path / "run", anatomy=study))
+    table = anatomy_table(run).set_index("kind")
+    assert table["stitches"].to_dict() == {FIRST_SKILLS: 2, HAND_OVERS: 3}
+    assert table["hurt"].to_dict() == {FIRST_SKILLS: 2, HAND_OVERS: 1}
+    assert np.isnan(table.loc[FIRST_SKILLS, "auc_value_spread"])  # all of them hurt
+    assert table.loc[HAND_OVERS, "auc_value_spread"] == 1
+    html = section(run)
+    assert "1 first skill and 1 pair, 5 episodes of each" in html
+    assert "Every first skill from the start of an episode, and every ordered pair" in html
+    for kind in (FIRST_SKILLS, HAND_OVERS):
+        assert f'<th scope="row">{kind}</th>' in html
+    with house_style():
+        figure = draw_anatomy(run.anatomy)
+    assert len(figure.axes) == 2 * 4
+    assert FIRST_SKILLS in figure.axes[0].get_ylabel()
 
 
 def test_nothing_was_stitched(tmp_path: Path, write_run: Any) -> None:

@@ -12,7 +12,10 @@ from analysis.figures.scenes import NoPictureError
 from analysis.report import build_report, export_results
 from tests.analysis.kitchen_run import write_kitchen
 
-STUDIES = {"pairs.csv", "pair-groups.csv", "models.csv", "anatomy.csv", "stitches.csv"}
+STUDIES = {
+    "pairs.csv", "pair-groups.csv", "models.csv", "anatomy.csv", "stitches.csv", "profile.csv",
+    "profile.md",
+}  # fmt: skip
 KITCHEN_FIGURES = {
     "stitch-values", "contact-sheet", "pairs", "diagnosis", "diagnosis-values", "anatomy",
 }  # fmt: skip
@@ -55,6 +58,9 @@ def test_the_page_says_what_the_files_say(tmp_path: Path, write_run: Any) -> Non
     assert "When does stitching hurt?" in page
     assert "pairs in the data (3)" in page.replace("\N{NO-BREAK SPACE}", " ")
     assert "97 of 100" in page
+    assert "First and second skills" in page
+    assert "No-Stitch and MB-Stitch share their first skills." in page
+    assert "paper 0.697 to 1.000 · agrees" in page  # the microwave: 8 of 8
     assert "Framed: pairs that occur in the data" in page
     assert "MB-Stitch accomplishes more than No-Stitch in 8" in page
     groups = pd.read_csv(tmp_path / "run" / "report" / "pair-groups.csv")

@@ -1,6 +1,7 @@
 """What a plan says before anything runs: found, missing, decided."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -95,6 +96,43 @@ def test_survivors_are_expected_as_they_were_before(
     costs = estimate(plan, Store(tmp_path), shared)
     assert costs.segments_missing == plan.spec.episodes * (first + second / 2)
     assert costs.seconds_evaluation == pytest.approx(costs.segments_missing)
+
+
+@pytest.fixture(scope="module")
+def first_stitch(spec: Spec) -> Plan:
+    return make_plan(replace(spec, rollout=replace(spec.rollout, first_stitch=True)))
+
+
+def test_first_skills_that_are_stitched_to_are_their_method_s(
+    first_stitch: Plan, shared: Ledger, tmp_path: Path
+) -> None:
+    """In counts, and in how often they were seen to succeed."""
+    spec = first_stitch.spec
+    for kind, successes in {"any method": 10, "mb-stitch": 5}.items():
+        name = f"{spec.benchmark}, {kind}, skill 1"
+        shared.add_played(name, Played(segments=10, successes=successes, seconds=10.0))
+    costs = estimate(first_stitch, Store(tmp_path), shared)
+    blocks = len(first_stitch.chunks) * spec.seeds * len(spec.skill_names)
+    assert costs.blocks[""] == {"missing": blocks}
+    own = costs.blocks["mb-stitch"]["missing"]
+    assert own == costs.blocks["random-stitch"]["missing"]
+    assert own == costs.blocks["no-stitch"]["missing"] + blocks
+    arriving = {
+        place.node.method: place.arriving
+        for place in standings(first_stitch, shared, shared.history())
+        if len(place.node.prefix) == 2
+    }
+    assert arriving["no-stitch"] == arriving["mf-stitch"] == 2 * arriving["mb-stitch"]
+
+
+def test_a_plan_says_how_many_first_skills_are_shared(
+    first_stitch: Plan, shared: Ledger, tmp_path: Path
+) -> None:
+    for methods, there in ((first_stitch.spec.methods, True), (("mb-stitch",), False)):
+        plan = make_plan(replace(first_stitch.spec, methods=methods))
+        costs = estimate(plan, Store(tmp_path), shared)
+        text = "\n".join(plan_lines(plan.spec, costs, workers=2))
+        assert ("first skills, shared" in text) == there
 
 
 def test_the_plan_is_printed_for_a_person(plan: Plan, shared: Ledger, tmp_path: Path) -> None:

@@ -177,7 +177,10 @@ def test_a_part_that_gives_up_blocks(
 def test_stitches_taken_apart_are_kept_by_part(done: Path, tmp_path: Path) -> None:
     """Under the names that skills have where all parts meet."""
     study = {
-        "pairs": [{"first": "g0", "second": "g1", "arrived": 1}],
+        "pairs": [
+            {"first": "", "second": "g1", "arrived": 1},  # a first skill
+            {"first": "g0", "second": "g1", "arrived": 1},
+        ],
         "stitches": [{"first": "g0", "second": "g1", "episode": 0}],
         "typical_distance": {"g1": 0.1},
     }
@@ -187,9 +190,25 @@ def test_stitches_taken_apart_are_kept_by_part(done: Path, tmp_path: Path) -> No
     assert directory.read_json("anatomy.json") == {"parts": {"level-2": study}}
     suite = lists(tmp_path)
     renamed = anatomy_of_part(study, Naming(suite, suite.parts[0]))
-    assert renamed["pairs"] == [{"first": "short:g0", "second": "short:g1", "arrived": 1}]
+    assert renamed["pairs"] == [
+        {"first": "", "second": "short:g1", "arrived": 1},
+        {"first": "short:g0", "second": "short:g1", "arrived": 1},
+    ]
     assert renamed["stitches"][0]["second"] == "short:g1"
     assert renamed["typical_distance"] == {"short:g1": 0.1}
+
+
+def test_parts_may_differ_in_whether_first_skills_are_stitched_to(tmp_path: Path) -> None:
+    suite = lists(tmp_path)
+    stitched, plain = suite.parts
+    rollout = replace(stitched.spec.rollout, first_stitch=True)
+    stitched = replace(stitched, spec=replace(stitched.spec, rollout=rollout))
+    suite = replace(suite, parts=(stitched, plain))
+    own = {m["name"]: m["own_first_skill"] for m in describe_suite(suite)["methods"]}
+    assert own == {"no-stitch": False, "mb-stitch": True}
+    assert Naming(suite, stitched).played_by("mb-stitch") == ["mb-stitch"]
+    assert Naming(suite, stitched).played_by("") == [""]
+    assert Naming(suite, plain).played_by("") == ["", "mb-stitch"]
 
 
 def test_every_part_is_shown_under_the_names_of_the_whole(done: Path, tmp_path: Path) -> None:

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 import torch
 
-from stitching.anatomy import Subject, Surroundings, anatomy
+from stitching.anatomy import START, Subject, anatomy
 from stitching.data.transitions import Transitions
 from stitching.envs.maze import Maze
 from stitching.models.agent import Agent
-from stitching.models.dynamics import Dynamics
 from stitching.planning.objective import spread_over_members
 from stitching.planning.random_shooting import RandomShooting
 from stitching.rollout import Play, RolloutConfig, play_from_start
@@ -19,6 +18,7 @@ from stitching.stitchers import MBStitch, NoStitch, Proposal, Stitcher
 
 EPISODES = 8
 PAIRS = [("b", "a"), ("b", "d"), ("d", "b")]
+STARTS = [(START, "b"), (START, "d")]
 LIMIT = 30
 
 
@@ -42,7 +42,8 @@ def subject(
         stitcher = EveryOther(
             **{each.name: getattr(stitcher, each.name) for each in fields(stitcher)}
         )
-    return Subject(maze, agent, stitcher, RolloutConfig(), LIMIT, root_seed=0, seed=0)
+    rollout = RolloutConfig(first_stitch=True)
+    return Subject(maze, agent, stitcher, rollout, LIMIT, root_seed=0, seed=0)
 
 
 @pytest.fixture(scope="module")
@@ -50,31 +51,48 @@ def study(subject: Subject, demonstrations: Transitions) -> dict[str, Any]:
     return anatomy(subject, demonstrations, PAIRS, EPISODES)
 
 
-@pytest.mark.parametrize("pair", PAIRS)
+@pytest.mark.parametrize("pair", STARTS + PAIRS)
 def test_both_ways_are_as_an_evaluation_plays_them(
     subject: Subject, study: dict[str, Any], pair: tuple[str, str]
 ) -> None:
+    """A pair's own first skill is No-Stitch's, whoever goes on from there."""
     own = [s for s in study["stitches"] if (s["first"], s["second"]) == pair]
+    prefix = tuple(skill for skill in pair if skill != START)
+    first_stitch = pair in STARTS
+    rollout = replace(subject.rollout, first_stitch=first_stitch)
     ways: dict[str, tuple[str, Stitcher]] = {
         "without": ("no-stitch", NoStitch()),
         "with": ("mb-stitch", subject.stitcher),
     }
     for way, (method, stitcher) in ways.items():
-        play = Play(0, subject.benchmark.name, 0, method, tuple(range(EPISODES)), pair)
-        first, *second = play_from_start(
+        play = Play(0, subject.benchmark.name, 0, method, tuple(range(EPISODES)), prefix)
+        *before, last = play_from_start(
             subject.benchmark.block(), subject.agent, stitcher, subject.benchmark,
-            subject.rollout, play, LIMIT,
+            rollout, play, LIMIT,
         )  # fmt: skip
-        assert [s["episode"] for s in own] == np.flatnonzero(first.success).tolist()
+        arrived = np.flatnonzero(before[0].success) if before else np.arange(EPISODES)
+        assert [s["episode"] for s in own] == arrived.tolist()
         assert own  # else nothing is tested
-        assert [s[f"succeeds_{way}"] for s in own] == second[0].success.tolist()
-        assert [s[f"steps_{way}"] for s in own] == second[0].steps.tolist()
+        assert [s[f"succeeds_{way}"] for s in own] == last.success.tolist()
+        assert [s[f"steps_{way}"] for s in own] == last.steps.tolist()
         if way == "with":
-            assert [len(s["value"]) - 1 for s in own] == second[0].stitch_steps.tolist()
+            assert [len(s["value"]) - 1 for s in own] == last.stitch_steps.tolist()
             ends = [s["value"][-1] for s in own]
-            np.testing.assert_allclose(ends, second[0].value_end, atol=1e-4)
+            np.testing.assert_allclose(ends, last.value_end, atol=1e-4)
             starts = [s["value"][0] for s in own]
-            np.testing.assert_allclose(starts, second[0].value_start, atol=1e-4)
+            np.testing.assert_allclose(starts, last.value_start, atol=1e-4)
+
+
+def test_first_skills_are_taken_apart_only_where_they_are_stitched_to(
+    subject: Subject, study: dict[str, Any], demonstrations: Transitions
+) -> None:
+    between = replace(subject, rollout=RolloutConfig())
+    assert any(s["plans"] for s in study["stitches"] if s["first"] == START)
+    without = anatomy(between, demonstrations, PAIRS, EPISODES)
+    pairs = [(pair["first"], pair["second"]) for pair in study["pairs"]]
+    assert pairs == STARTS + PAIRS
+    assert without["pairs"] == study["pairs"][len(STARTS) :]
+    assert without["stitches"] == [s for s in study["stitches"] if s["first"] != START]
 
 
 def test_some_stitch_is_taken_apart_step_by_step(subject: Subject, study: dict[str, Any]) -> None:
@@ -111,36 +129,3 @@ def test_real_values_are_the_agent_s(subject: Subject, study: dict[str, Any]) ->
     values = subject.agent.values(torch.from_numpy(block.observe(np.arange(1))), 0)
     assert stitch["value"][0] == pytest.approx(float(values.mean(dim=0)), abs=1e-4)
     assert stitch["spread"][0] == pytest.approx(float(spread_over_members(values)), abs=1e-4)
-
-
-def test_demonstrated_states_are_at_no_distance(
-    demonstrations: Transitions, dynamics: Dynamics
-) -> None:
-    near = Surroundings.of(demonstrations, 2, dynamics)
-    rows = np.concatenate(demonstrations.episode_rows(2))
-    own = dynamics.scaled(torch.from_numpy(demonstrations.observations[rows]))
-    assert near.distances(own).max() == 0
-    away = own[:1] + 100.0
-    assert float(near.distances(away)) == pytest.approx(100.0, rel=0.1)
-
-
-class Unscaled(Dynamics):
-    def __init__(self) -> None:
-        """Has learned nothing."""
-
-    def scaled(self, states: torch.Tensor) -> torch.Tensor:
-        return states
-
-
-def test_demonstrations_are_typically_as_far_apart_as_they_are() -> None:
-    observations = np.repeat(np.array([[0.0], [0.5], [9.0]], dtype=np.float32), [3, 3, 1], axis=0)
-    data = Transitions(
-        observations=np.tile(observations, (1, 4)),
-        actions=np.zeros((7, 2), dtype=np.float32),
-        next_observations=np.zeros((7, 4), dtype=np.float32),
-        episode_ends=np.array([3, 6, 7]),
-        episode_skills=np.array([0, 0, 1]),
-        episode_successes=np.ones(3, dtype=bool),
-    )
-    assert Surroundings.of(data, 0, Unscaled()).typical() == pytest.approx(0.5)
-    assert Surroundings.of(data, 1, Unscaled()).typical() is None

@@ -1,5 +1,6 @@
 """What a candidate's episodes come to."""
 
+from dataclasses import replace
 from typing import cast
 
 import pandas as pd
@@ -24,3 +25,16 @@ def test_an_interval_is_about_other_tasks_too() -> None:
     result = showing.result("test")
     assert (result["gain_low"], result["gain"], result["gain_high"]) == (0, 0.5, 1)
     assert result["tasks"] == {"g0>g1": 1.0, "g1>g0>g2": 0.0}
+
+
+def test_first_skills_count_where_candidates_have_their_own() -> None:
+    """Failed by both: with shared first skills nothing could differ, with own ones it could."""
+    baseline = pd.DataFrame(
+        {"seed": 0, "task": "g0>g1", "episode": range(3), "length": 2, "accomplished": [0, 0, 1]}
+    )
+    config = cast(MBStitchConfig, load_spec("table1").method_config("mb-stitch"))
+    episodes = baseline.assign(accomplished=[0, 1, 1])
+    shared = Showing("mb-stitch", config, pd.DataFrame(), episodes, baseline)
+    places = {("g0>g1", episode): episode for episode in range(3)}
+    assert shared.instances(places) == {1: 0.5, 2: 0.0}
+    assert replace(shared, own_first_skill=True).instances(places) == {0: 0.0, 1: 0.5, 2: 0.0}

@@ -66,7 +66,7 @@ def test_every_block_is_played_once(trained: Path, monkeypatch: pytest.MonkeyPat
     found = counts(trained)["blocks played"]
     assert sum(found.values()) == len(executor.played)
     # Two chunks of the search's seed: first skills of g0, g1; then of g2, g3 by the new seed.
-    assert found["first skills"] == 2 * 2 + 2 * 2
+    assert found["first skills, shared"] == 2 * 2 + 2 * 2
     assert found["no-stitch"] <= 2 * 4 + 2 * 2
 
 
@@ -109,7 +109,7 @@ def test_training_fields_retrain_what_they_touch_and_no_more(trained: Path) -> N
     space = {"dynamics.updates": Dimension(choices=(60, 30)), ALPHA: Dimension(choices=(1, 10))}
     sweep_in(trained, tiny_sweep(sampler="grid", space=space, confirm=UNCONFIRMED))
     assert counts(trained)["artifacts trained"] == {"dynamics": 1}
-    assert counts(trained)["blocks played"]["first skills"] == 2 * 2
+    assert counts(trained)["blocks played"]["first skills, shared"] == 2 * 2
     assert len(trials(trained)) == 4
 
 
