@@ -16,7 +16,7 @@ from stitching.models.agent import Agent
 from stitching.models.dynamics import Dynamics
 from stitching.models.iql import IQLConfig
 from stitching.planning.cem import CEM
-from stitching.planning.objective import Norm
+from stitching.planning.objective import Norm, Price
 from stitching.planning.random_shooting import RandomShooting
 from stitching.stitchers import MBStitch, MFStitch, NoStitch, RandomStitch, Stitcher
 
@@ -45,6 +45,7 @@ class MBStitchConfig:
     beta: float = 1.0  # β of Eq. 2, price of the dynamics ensemble's disagreement
     norm: Norm = "mean"  # how Eq. 2's second variance becomes a number
     selective: bool = False  # act only on plans that promise more than the present
+    price: Price = "end"  # Var(T) of a plan: of its last state, or the mean over its steps
     planner: Literal["random-shooting", "cem"] = "cem"
     random_shooting: RandomShooting = RandomShooting()
     cem: CEM = CEM()
@@ -139,5 +140,6 @@ def make_stitcher(
             config.execute,
             config.limit,
             config.selective,
+            config.price,
         )
     return NoStitch()

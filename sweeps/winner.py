@@ -16,7 +16,7 @@ RUNS = Path("runs")
 def find_sweep(name: str) -> Path:
     """A sweep's directory, by its path, or by its name at the largest scale that has a winner."""
     places = [Path(name)]
-    places += [RUNS / f"sweep-{name}-{scale}" for scale in ("paper", "quick", "smoke")]
+    places += [RUNS / f"sweep-{name}-{scale}" for scale in ("paper", "standard", "quick", "smoke")]
     for place in places:
         if (place / "winner.json").is_file():
             return place

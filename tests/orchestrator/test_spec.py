@@ -34,10 +34,14 @@ def test_table1_is_the_papers_protocol() -> None:
     assert (shooting.population, shooting.horizon, spec.mb_stitch.execute) == (200, 5, 5)
 
 
+def test_table1s_standard_scale_is_the_papers() -> None:
+    assert replace(load_spec("table1", "standard"), scale="paper") == load_spec("table1")
+
+
 def test_an_unknown_spec_or_scale_lists_what_there_is(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"no spec 'table99'.*table1"):
         load_spec("table99")
-    with pytest.raises(UsageError, match="no scale 'huge'; it has paper, smoke, quick"):
+    with pytest.raises(UsageError, match="no scale 'huge'; it has paper, smoke, quick, standard"):
         load_spec("table1", "huge")  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="neither a file"):
         load_spec(str(tmp_path))

@@ -15,7 +15,7 @@ from stitching.models.agent import Agent
 from stitching.models.dynamics import Dynamics, DynamicsConfig
 from stitching.models.layers import init_mlp, prefixed
 from stitching.planning.cem import CEM
-from stitching.planning.objective import Norm
+from stitching.planning.objective import Norm, Price, conservative_value
 from stitching.planning.random_shooting import RandomShooting
 from stitching.stitchers import (
     MBStitch,
@@ -202,22 +202,27 @@ def equation_2(
     stitcher: MBStitch,
 ) -> float:
     mean, std = model["observation_mean"].astype(np.float64), model["observation_std"]
-    ends = []
+    paths = []
     for member in range(MODELS):
-        imagined = state.astype(np.float64)
+        path = [state.astype(np.float64)]
         for action in actions:
-            inputs = np.concatenate([(imagined - mean) / std, action])
-            imagined = imagined + plain(model, "t", member, inputs) * std
-        ends.append(imagined)
-    average = np.mean(ends, axis=0)
+            inputs = np.concatenate([(path[-1] - mean) / std, action])
+            path.append(path[-1] + plain(model, "t", member, inputs) * std)
+        paths.append(path[1:])
+    average = np.mean([path[-1] for path in paths], axis=0)
     inputs = np.concatenate([(average - mean) / std, CONDITIONS[skill]])
     values = [plain(agent, "v", member, inputs)[0] for member in range(VALUES)]
-    spread = [np.std([end[k] / std[k] for end in ends]) for k in range(OBSERVATION)]
-    penalties = stitcher.alpha * np.std(values) + stitcher.beta * REDUCE[stitcher.norm](spread)
-    return np.mean(values) - penalties
+    disagreements = [
+        REDUCE[stitcher.norm](
+            [np.std([state[k] / std[k] for state in step]) for k in range(OBSERVATION)]
+        )
+        for step in zip(*paths, strict=True)
+    ]
+    disagreement = disagreements[-1] if stitcher.price == "end" else np.mean(disagreements)
+    return np.mean(values) - stitcher.alpha * np.std(values) - stitcher.beta * disagreement
 
 
-def mb_stitch(actions: ActionSpace, norm: Norm = "mean", **settings: float) -> MBStitch:
+def mb_stitch(actions: ActionSpace, norm: Norm = "mean", **settings: float | Price) -> MBStitch:
     agent, model = random_models(actions)
     config = DynamicsConfig(members=MODELS, width=8, hidden_layers=1)
     stitcher = MBStitch(
@@ -240,9 +245,12 @@ def planned_from(n: int = 4) -> np.ndarray:
 
 @pytest.mark.parametrize("space", [MOVES, ARM], ids=["discrete", "continuous"])
 @pytest.mark.parametrize("norm", ["mean", "l2", "max"])
+@pytest.mark.parametrize("price", ["end", "path"])
 @pytest.mark.parametrize(("horizon", "skill"), [(1, 0), (3, 1)])
-def test_the_score_is_equation_2(space: ActionSpace, norm: Norm, horizon: int, skill: int) -> None:
-    stitcher, states = mb_stitch(space, norm), planned_from()
+def test_the_score_is_equation_2(
+    space: ActionSpace, norm: Norm, price: Price, horizon: int, skill: int
+) -> None:
+    stitcher, states = mb_stitch(space, norm, price=price), planned_from()
     problems = torch.tensor([3, 0, 2])  # those that a planner still works on
     sequences = space.uniform(stream("actions"), (len(problems), 6, horizon))
     scores = stitcher.score(torch.from_numpy(states), skill)(problems, torch.from_numpy(sequences))
@@ -252,6 +260,31 @@ def test_the_score_is_equation_2(space: ActionSpace, norm: Norm, horizon: int, s
         for p, plan in zip(problems, sequences, strict=True)
     ]
     np.testing.assert_allclose(scores, expected, atol=1e-4)
+
+
+@pytest.mark.parametrize("norm", ["mean", "l2", "max"])
+def test_of_one_step_the_path_is_its_end(norm: Norm) -> None:
+    states, sequences = torch.from_numpy(planned_from()), ARM.uniform(stream("a"), (4, 6, 1))
+    end, path = (
+        mb_stitch(ARM, norm, price=price).score(states, 1)(
+            torch.arange(4), torch.from_numpy(sequences)
+        )
+        for price in ("end", "path")
+    )
+    assert torch.equal(end, path)
+
+
+@pytest.mark.parametrize("space", [MOVES, ARM], ids=["discrete", "continuous"])
+def test_the_price_of_the_end_is_that_of_the_imagined_state(space: ActionSpace) -> None:
+    """To the last bit: what planners maximise decides the bytes of results."""
+    stitcher, starts = mb_stitch(space), torch.from_numpy(planned_from(6))
+    sequences = torch.from_numpy(space.uniform(stream("actions"), (6, 5)))
+    scores = stitcher.score(starts, 1)(torch.arange(6), sequences[:, None])
+    imagined = stitcher.dynamics.imagine(starts, sequences)
+    expected = conservative_value(
+        stitcher.agent.values(imagined.mean(dim=0), 1), stitcher.dynamics.scaled(imagined), 2.0, 3.0
+    )
+    assert torch.equal(scores[:, 0], expected)
 
 
 @pytest.mark.parametrize(("alpha", "beta"), [(0.0, 0.0), (2.0, 3.0), (20.0, 0.0)])
