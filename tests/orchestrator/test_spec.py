@@ -67,6 +67,7 @@ def test_a_broken_file_is_refused_naming_it(tmp_path: Path, text: str, message: 
 
 SOUND = "benchmark='maze'\nname='x'\ntitle=''\ntasks=['g0>g1']\nstep_limits={2=50}\n"
 SOUND += "methods=['no-stitch']\n"
+MF = SOUND.replace("no-stitch", "mf-stitch") + "[mf_stitch]\n"
 
 
 def test_the_spec_below_is_sound(tmp_path: Path) -> None:
@@ -96,6 +97,9 @@ def test_the_spec_below_is_sound(tmp_path: Path) -> None:
         (SOUND.replace("''", "1979-05-27"), "title: expected str"),
         (SOUND + "# \udcff", "not valid TOML"),
         (SOUND + "rollout = " + 9999 * "[", "not valid TOML"),
+        (MF + "mixture = 'both'", "mixture: 'both' is not one of halves, joined"),
+        (MF + "training.policy_width = 7", r"layers of \[7, 7\] cannot be fine-tuned from"),
+        (MF + "[agent]\nmulti_task = false", "fine-tuned pair by pair; set training.multi_task"),
         (SOUND.replace("'x'", "'..'"), r"'\.\.' is no name"),
         (SOUND.replace("'x'", "'a/../../b'"), "'a/../../b' is no name"),
         (SOUND.replace("'x'", "'/etc/x'"), "'/etc/x' is no name"),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from stitching.data.experience import mixed_conditions, skill_pairs
+from stitching.data.mixtures import skill_pairs
 from stitching.envs.maze import Maze
 from stitching.envs.protocol import ActionSpace
 from stitching.models.agent import Agent
@@ -137,7 +137,8 @@ def linear_agent(
 
 def test_mf_stitch_asks_its_policy_about_the_ordered_pair() -> None:
     """This policy heads for the following skill and shuns the previous one."""
-    conditions = mixed_conditions(np.eye(4, dtype=np.float32))
+    one_hot = np.eye(4, dtype=np.float32)
+    conditions = np.array([[*one_hot[i], *one_hot[j]] for i, j in skill_pairs(4)])
     towards = np.concatenate([np.zeros((6, 4)), -50 * np.eye(4), 50 * np.eye(4)])
     policy = linear_agent(np.zeros((1, 14)), towards, conditions, MOVES)
     pairs = {pair: row for row, pair in enumerate(skill_pairs(4))}
