@@ -10,13 +10,13 @@ from typing import Any, Literal
 
 from orchestrator.errors import UsageError
 from orchestrator.structure import structure
-from stitching.data.experience import skill_pairs
+from stitching.data.mixtures import Mixture, skill_pairs
 from stitching.envs.protocol import Benchmark
 from stitching.models.agent import Agent
 from stitching.models.dynamics import Dynamics
 from stitching.models.iql import IQLConfig
 from stitching.planning.cem import CEM
-from stitching.planning.objective import Norm
+from stitching.planning.objective import Norm, Price
 from stitching.planning.random_shooting import RandomShooting
 from stitching.rollout import RolloutConfig
 from stitching.stitchers import MBStitch, MFStitch, NoStitch, RandomStitch, Stitcher
@@ -35,7 +35,8 @@ class RandomStitchConfig:
 @dataclass(frozen=True)
 class MFStitchConfig:
     limit: int = 5
-    training: IQLConfig = IQLConfig()  # the extra policy, learned from the mixed data
+    mixture: Mixture = "fine-tuned"  # how the paper's "mixed" dataset is read
+    training: IQLConfig = IQLConfig()  # the extra policy, learned from it
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,7 @@ class MBStitchConfig:
     beta: float = 1.0  # β of Eq. 2, price of the dynamics ensemble's disagreement
     norm: Norm = "mean"  # how Eq. 2's second variance becomes a number
     selective: bool = False  # act only on plans that promise more than the present
+    price: Price = "end"  # Var(T) of a plan: of its last state, or the mean over its steps
     planner: Literal["random-shooting", "cem"] = "cem"
     random_shooting: RandomShooting = RandomShooting()
     cem: CEM = CEM()
@@ -54,6 +56,23 @@ class MBStitchConfig:
     def horizon(self) -> int:
         """Steps that plans look ahead."""
         return (self.cem if self.planner == "cem" else self.random_shooting).horizon
+
+
+def check_start(config: MFStitchConfig, agent: IQLConfig, where: str) -> None:
+    """Refuse to fine-tune a policy that could not be the one that the skills are learned by."""
+    if config.mixture != "fine-tuned":
+        return
+    if config.training.policy_hidden != agent.policy_hidden:
+        raise UsageError(
+            f"{where}: hidden layers of {config.training.policy_hidden} cannot be fine-tuned from "
+            f"the skills' policy with {agent.policy_hidden}; set training.policy_width and "
+            "training.policy_layers to the agent's, or another mixture"
+        )
+    if config.training.multi_task and not agent.multi_task:
+        raise UsageError(
+            f"{where}: skills with a policy each are fine-tuned pair by pair; set "
+            "training.multi_task to false, or another mixture"
+        )
 
 
 MethodConfig = NoStitchConfig | RandomStitchConfig | MFStitchConfig | MBStitchConfig
@@ -150,5 +169,6 @@ def make_stitcher(
             config.execute,
             config.limit,
             config.selective,
+            config.price,
         )
     return NoStitch()

@@ -150,7 +150,9 @@ def make_plan(spec: Spec) -> Plan:
             config = spec.method_config(method)
             if isinstance(config, MFStitchConfig):
                 params = {"config": to_plain(config.training), "seed": seed, **root}
-                mf_policies[seed, method] = add("mf-policy", params, demonstrations)
+                params["mixture"] = config.mixture
+                start = {"agent": agents[seed]} if config.mixture == "fine-tuned" else {}
+                mf_policies[seed, method] = add("mf-policy", params, demonstrations | start)
     illustrations = {}
     if "dynamics" in needed:
         extras = {

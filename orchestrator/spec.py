@@ -24,6 +24,7 @@ from orchestrator.methods import (
     MethodConfig,
     MFStitchConfig,
     RandomStitchConfig,
+    check_start,
     method_name,
     parse_method,
 )
@@ -205,6 +206,8 @@ def _check_methods(spec: Spec, where: str) -> None:
         same = seen.setdefault((method_name(method), str(config)), method)
         if same != method or spec.methods.count(method) > 1:
             raise UsageError(f"{where}, methods: {same} and {method} are the same method")
+        if isinstance(config, MFStitchConfig):
+            check_start(config, spec.agent, f"{where}, {method}")
         discrete = BENCHMARKS[spec.benchmark].actions.discrete
         if isinstance(config, MBStitchConfig) and config.planner == "cem" and discrete:
             raise UsageError(

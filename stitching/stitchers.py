@@ -14,7 +14,7 @@ from torch import Tensor
 from stitching.envs.protocol import ActionSpace
 from stitching.models.agent import Agent
 from stitching.models.dynamics import Dynamics
-from stitching.planning.objective import Norm, conservative_value
+from stitching.planning.objective import Norm, Price, conservative_value
 from stitching.planning.protocol import Planner, Score
 
 
@@ -125,6 +125,7 @@ class MBStitch:
     execute: int  # actions of each plan that are carried out: all in the maze, 1 under CEM
     limit: int
     selective: bool = False  # act only on plans that promise more than the state they start from
+    price: Price = "end"  # which imagined states' Var(T) a plan pays for
 
     @cached_property
     def _critic(self) -> Agent:
@@ -150,7 +151,7 @@ class MBStitch:
         return conservative_value(values, states[None], self.alpha, self.beta, self.norm)
 
     def score(self, states: Tensor, following: int) -> Score:
-        """Eq. 2 at the end of each imagined action sequence, every member on its own path."""
+        """Eq. 2 of each imagined action sequence, every member on its own path."""
 
         def score(problems: Tensor, actions: Tensor) -> Tensor:
             population = actions.shape[1]
@@ -167,11 +168,22 @@ class MBStitch:
         return score
 
     def _imagine(self, starts: Tensor, sequences: Tensor, following: int) -> Tensor:
-        """Eq. 2 after each sequence: (n, observation), (n, horizon, action) → (n,)."""
-        imagined = self.dynamics.imagine(starts, sequences)  # (D, n, observation)
+        """Eq. 2 of sequences, (n, observation), (n, horizon, action) → (n,).
+
+        The value is always that of the last state.
+        """
+        if self.price == "end":
+            end = self.dynamics.imagine(starts, sequences)  # (D, n, observation)
+            return self._conservative_value(end, end, following)
+        path = self.dynamics.imagine_path(starts, sequences)  # (D, horizon, n, observation)
+        # The value is the same at every step's price, so the mean is over prices alone.
+        return self._conservative_value(path[:, -1], path, following).mean(dim=0)
+
+    def _conservative_value(self, end: Tensor, predicted: Tensor, following: int) -> Tensor:
+        """Eq. 2: the value at `end` (D, n, observation), the price of (D, ..., n, observation)."""
         return conservative_value(
-            self._critic.values(imagined.mean(dim=0), following),  # (M, n)
-            self.dynamics.scaled(imagined),
+            self._critic.values(end.mean(dim=0), following),  # (M, n)
+            self.dynamics.scaled(predicted),
             self.alpha,
             self.beta,
             self.norm,

@@ -6,7 +6,6 @@ from typing import Any
 
 from orchestrator.builders.parts import Inputs
 from orchestrator.structure import Plain, structure
-from stitching.data.experience import mixed_conditions
 from stitching.envs.protocol import Benchmark, conditions
 from stitching.models.agent import Agent
 from stitching.models.dynamics import Dynamics, DynamicsConfig
@@ -19,8 +18,8 @@ def load_models(benchmark: Benchmark, configs: Plain, artifacts: Inputs) -> dict
         if kind == "agent":
             models[kind] = Agent(artifact.arrays, conditions(benchmark), benchmark.actions)
         elif kind == "mf-policy":
-            pairs = mixed_conditions(conditions(benchmark))
-            models[kind] = Agent(artifact.arrays, pairs, benchmark.actions)
+            # What the reading of its data has told it, one condition a pair of skills.
+            models[kind] = Agent(artifact.arrays, artifact.arrays["conditions"], benchmark.actions)
         elif kind == "dynamics":
             config = structure(DynamicsConfig, configs[kind], kind)
             models[kind] = Dynamics(artifact.arrays, config)

@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+
 from orchestrator.builders.parts import Builder, Inputs
 from orchestrator.store import Artifact
 from orchestrator.structure import Plain, structure
-from stitching.data.experience import mixed_experience, skill_experience
+from stitching.data.experience import skill_experience
+from stitching.data.mixtures import mixed_experience, skill_pairs
 from stitching.data.transitions import Transitions, check, concatenate
 from stitching.envs.protocol import Benchmark, conditions
 from stitching.envs.registry import BENCHMARKS
+from stitching.models.agent import own_weights
 from stitching.models.dynamics import DynamicsConfig, train_dynamics
 from stitching.models.iql import IQLConfig, train_iql, train_single_tasks
-from stitching.models.training import Trained
+from stitching.models.layers import Params, parameters
+from stitching.models.training import Curves, Trained
 
 
 def _checked_data(params: Plain, inputs: Inputs) -> tuple[Benchmark, Transitions]:
     """The union of the input datasets, each checked before anything is trained on it."""
     benchmark = BENCHMARKS[params["benchmark"]]
     parts = []
-    for role, artifact in sorted(inputs.items()):
+    datasets = {role: artifact for role, artifact in inputs.items() if role != "agent"}
+    for role, artifact in sorted(datasets.items()):
         part = Transitions(**artifact.arrays)
         check(part, benchmark, source=role)
         parts.append(part)
@@ -42,10 +50,42 @@ def _agent(params: Plain, inputs: Inputs) -> Artifact:
 
 
 def _mf_policy(params: Plain, inputs: Inputs) -> Artifact:
+    """The policy, and the condition of each pair of skills beside it."""
     benchmark, data = _checked_data(params, inputs)
     config = structure(IQLConfig, params["config"], "mf_stitch.training")
-    experience = mixed_experience(data, conditions(benchmark))
-    return _trained(train_iql(experience, benchmark.actions, config, *_labels("mf-policy", params)))
+    skills = conditions(benchmark)
+    experience = mixed_experience(data, skills, params["mixture"])
+    starts = _next_policies(inputs["agent"], len(skills)) if "agent" in inputs else None
+    actions, labels = benchmark.actions, _labels("mf-policy", params)
+    if config.multi_task:
+        # Then so is the agent, and the next skill's policy is the same for every pair.
+        start = starts[0] if starts else None
+        trained = train_iql(experience, actions, config, *labels, policy_from=start)
+    else:
+        trained = train_single_tasks(experience, actions, config, *labels, policies_from=starts)
+        trained = replace(trained, curves=_averaged(trained.curves))
+    weights = trained.weights | {"conditions": experience.conditions}
+    return _trained(replace(trained, weights=weights))
+
+
+def _next_policies(agent: Artifact, skills: int) -> list[Params]:
+    """The policy of each pair's next skill."""
+    own = own_weights(agent.arrays, skills)
+    return [parameters(own[following], "policy") for _, following in skill_pairs(skills)]
+
+
+def _averaged(curves: Curves) -> Curves:
+    """Means over pairs of skills, which are too many to be looked at one by one."""
+    by_name: dict[str, list[list[tuple[int, float]]]] = {}
+    for name, curve in curves.items():
+        by_name.setdefault(name.partition(" of ")[0], []).append(curve)
+    return {
+        name: [
+            (points[0][0], float(np.mean([value for _, value in points])))
+            for points in zip(*several, strict=True)
+        ]
+        for name, several in by_name.items()
+    }
 
 
 def _dynamics(params: Plain, inputs: Inputs) -> Artifact:
@@ -56,9 +96,10 @@ def _dynamics(params: Plain, inputs: Inputs) -> Artifact:
 
 SETUP = ("orchestrator.builders.training",)
 LEARNING = ("stitching.models.iql", "stitching.data.experience")
+MIXED = (*LEARNING, "stitching.data.mixtures", "stitching.models.agent")
 
 TRAINING_BUILDERS = {
     "agent": Builder(_agent, LEARNING, SETUP),
-    "mf-policy": Builder(_mf_policy, LEARNING, SETUP),
+    "mf-policy": Builder(_mf_policy, MIXED, SETUP),
     "dynamics": Builder(_dynamics, ("stitching.models.dynamics",), SETUP),
 }

@@ -37,6 +37,13 @@ class Networks:
         )
 
 
+def own_weights(weights: Mapping[str, np.ndarray], count: int) -> list[Mapping[str, np.ndarray]]:
+    """The weights that serve each condition: those of `train_iql` serve them all."""
+    if "observation_mean" in weights:
+        return [weights] * count
+    return [named(weights, str(condition)) for condition in range(count)]
+
+
 class Agent:
     """Policy and value ensemble over (observation, condition); frozen, without gradients.
 
@@ -48,12 +55,7 @@ class Agent:
     ) -> None:
         self._conditions = torch.from_numpy(conditions)  # (C, condition)
         self._actions = actions
-        every = range(len(conditions))
-        if "observation_mean" in weights:
-            shared = Networks.of(weights)
-            self._networks = [shared for _ in every]
-        else:
-            self._networks = [Networks.of(named(weights, str(skill))) for skill in every]
+        self._networks = [Networks.of(own) for own in own_weights(weights, len(conditions))]
 
     def at_precision(self, precision: Precision) -> Agent:
         """The same agent with values computed in that precision (but for their last layer)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,10 +63,20 @@ class Dynamics:
 
         The same as one step after another, but normalised once.
         """
+        *_, last = self._scaled_steps(states, sequences)
+        return last * self._std + self._mean
+
+    def imagine_path(self, states: Tensor, sequences: Tensor) -> Tensor:
+        """States after each step: (n, observation), (n, horizon, action) → (D, horizon, n, …)."""
+        steps = torch.stack(list(self._scaled_steps(states, sequences)), dim=1)
+        return steps * self._std + self._mean
+
+    def _scaled_steps(self, states: Tensor, sequences: Tensor) -> Iterator[Tensor]:
+        """The members' states after each step, in units of their scale: (D, n, observation)."""
         scaled = ((states - self._mean) / self._std).unsqueeze(0)
         for actions in sequences.unbind(dim=1):
             scaled = scaled + self._change(scaled, actions)
-        return scaled * self._std + self._mean
+            yield scaled
 
     def _change(self, scaled: Tensor, actions: Tensor) -> Tensor:
         """Change of state in units of its scale: (D or 1, n, observation) → (D, n, observation)."""

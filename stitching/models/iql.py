@@ -8,7 +8,7 @@ and differ by their initial weights. The policy is extracted with the members' m
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,6 +47,11 @@ class IQLConfig:
     precision: Precision = "float32"  # of the hidden layers while training
     multi_task: bool = True  # one set of networks for all skills (Maze, Kitchen), or one a skill
     log_every: int = 500
+
+    @property
+    def policy_hidden(self) -> list[int]:
+        """Widths of the policy's hidden layers."""
+        return [self.policy_width or self.width] * (self.policy_layers or self.hidden_layers)
 
 
 @dataclass(frozen=True)
@@ -120,11 +125,16 @@ def iql_losses(
 
 
 def train_iql(
-    experience: Experience, actions: ActionSpace, config: IQLConfig, *labels: str | int
+    experience: Experience,
+    actions: ActionSpace,
+    config: IQLConfig,
+    *labels: str | int,
+    policy_from: Params | None = None,
 ) -> Trained:
     """Learn value ensemble and policy; all randomness comes from streams named by `labels`.
 
-    Raises FloatingPointError when a loss stops being finite.
+    `policy_from`, of the same shape and with its "log_std", is where the policy starts; the values
+    are learned anew. Raises FloatingPointError when a loss stops being finite.
     """
     mean, std = observation_scale(experience.data.observations)
     state = experience.data.observations.shape[1] + experience.conditions.shape[1]
@@ -132,9 +142,11 @@ def train_iql(
     init = stream("init", *labels)
     q = init_mlp(2 * config.members, [state + actions.size, *hidden, 1], init)
     v = init_mlp(config.members, [state, *hidden, 1], init)
-    width, layers = config.policy_width or config.width, config.policy_layers or len(hidden)
-    policy = init_mlp(1, [state, *[width] * layers, actions.size], init)
-    log_std = torch.zeros(actions.size)
+    policy = init_mlp(1, [state, *config.policy_hidden, actions.size], init)
+    policy["log_std"] = torch.zeros(actions.size)
+    if policy_from is not None:
+        policy = {name: policy_from[name].clone() for name in policy}
+    log_std = policy.pop("log_std")
     q_target = {name: weight.clone() for name, weight in q.items()}
 
     critic = [*q.values(), *v.values()]
@@ -169,15 +181,24 @@ def train_iql(
 
 
 def train_single_tasks(
-    experience: Experience, actions: ActionSpace, config: IQLConfig, *labels: str | int
+    experience: Experience,
+    actions: ActionSpace,
+    config: IQLConfig,
+    *labels: str | int,
+    policies_from: Sequence[Params] | None = None,
 ) -> Trained:
-    """Learn each skill with networks of its own (Robosuite); weights are named "skill.network"."""
+    """Learn each condition with networks of its own: a skill's (Robosuite) or a pair's.
+
+    Weights are named "condition.network". `policies_from`: where each condition's policy starts.
+    """
     weights: dict[str, np.ndarray] = {}
     curves: Curves = {}
-    for skill in range(len(experience.conditions)):
-        one = train_iql(experience.of(skill), actions, config, *labels, skill)
-        weights |= {f"{skill}.{name}": array for name, array in one.weights.items()}
-        curves |= {f"{name} of skill {skill}": curve for name, curve in one.curves.items()}
+    for condition in range(len(experience.conditions)):
+        policy_from = policies_from[condition] if policies_from else None
+        own = experience.of(condition)
+        one = train_iql(own, actions, config, *labels, condition, policy_from=policy_from)
+        weights |= {f"{condition}.{name}": array for name, array in one.weights.items()}
+        curves |= {f"{name} of skill {condition}": curve for name, curve in one.curves.items()}
     return Trained(weights, curves)
 
 

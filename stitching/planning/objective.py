@@ -7,6 +7,7 @@ import torch
 from torch import Tensor
 
 Norm = Literal["mean", "l2", "max"]
+Price = Literal["end", "path"]  # what a plan's Var(T) is: its last state's, or its steps' mean
 
 # The paper writes Var(T) of a vector-valued T as a scalar without saying how. "mean" lets β
 # keep its meaning whatever the size of the observation.

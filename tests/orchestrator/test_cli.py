@@ -96,7 +96,10 @@ def test_every_field_of_a_spec_is_an_option(cli: Cli) -> None:
         (["plan"], "skillstitch plan needs a spec: table1"),
         (["run", "--seeds", "3"], "skillstitch run needs a spec: table1"),
         (["plan", "table99"], "no spec 'table99': neither a file nor one of table1"),
-        (["plan", "table1", "--scale", "huge"], "no scale 'huge'; it has paper, smoke, quick"),
+        (
+            ["plan", "table1", "--scale", "huge"],
+            "no scale 'huge'; it has paper, smoke, quick, standard",
+        ),
         (["plan", "table1", "--alhpa", "3"], "--alhpa"),
         (["plan", "table1", "--seeds", "many"], "--seeds"),
         (["plan", "table1", "--seeds", "0"], "seeds: must be at least 1"),

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import permutations
+from typing import get_args
 
 import pytest
 
@@ -10,6 +11,7 @@ from orchestrator.methods import first_method
 from orchestrator.plan import Node, Plan, make_plan
 from orchestrator.recipes import _closure
 from orchestrator.spec import Spec, load_spec
+from stitching.data.mixtures import Mixture
 from stitching.envs.kitchen import KITCHEN
 from stitching.envs.maze import MAZE
 from stitching.envs.registry import BENCHMARKS
@@ -144,6 +146,19 @@ def test_more_seeds_methods_or_tasks_touch_nothing(plan: Plan, spec: Spec) -> No
 @pytest.mark.parametrize("module", [*BLOCK_CODE, *BLOCK_SETUP, "stitching.planning.objective"])
 def test_blocks_are_named_by_the_code_that_plays_them(module: str) -> None:
     assert module in _closure(BLOCK_CODE) | set(BLOCK_SETUP)
+
+
+def test_only_a_fine_tuned_stitch_depends_on_the_agent(spec: Spec) -> None:
+    """And each reading of the mixed data is another artifact."""
+    mixtures = get_args(Mixture)
+    methods = tuple(f"mf-stitch[mixture={mixture}]" for mixture in mixtures)
+    plan = make_plan(replace(spec, methods=methods, seeds=1))
+    made = [plan.mf_policies[0, method] for method in methods]
+    assert len(set(made)) == len(mixtures)
+    for mixture, key in zip(mixtures, made, strict=True):
+        inputs = plan.recipes[key].inputs
+        assert ("agent" in inputs) == (mixture == "fine-tuned")
+        assert "demonstrations" in inputs
 
 
 def test_settings_in_a_methods_name_are_settings(spec: Spec) -> None:

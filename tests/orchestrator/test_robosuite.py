@@ -28,9 +28,7 @@ def small(name: str) -> Spec:
         agent=skills,
         dynamics=DynamicsConfig(updates=100, width=32, members=2, activation="sigmoid"),
         random_stitch=replace(spec.random_stitch, limit=2),
-        mf_stitch=replace(
-            spec.mf_stitch, limit=2, training=replace(skills, updates=50, multi_task=True)
-        ),
+        mf_stitch=replace(spec.mf_stitch, limit=2, training=replace(skills, updates=50)),
         mb_stitch=replace(spec.mb_stitch, limit=2, cem=CEM(population=16, elites=4, iterations=5)),
     )
 

@@ -34,10 +34,14 @@ def test_table1_is_the_papers_protocol() -> None:
     assert (shooting.population, shooting.horizon, spec.mb_stitch.execute) == (200, 5, 5)
 
 
+def test_table1s_standard_scale_is_the_papers() -> None:
+    assert replace(load_spec("table1", "standard"), scale="paper") == load_spec("table1")
+
+
 def test_an_unknown_spec_or_scale_lists_what_there_is(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"no spec 'table99'.*table1"):
         load_spec("table99")
-    with pytest.raises(UsageError, match="no scale 'huge'; it has paper, smoke, quick"):
+    with pytest.raises(UsageError, match="no scale 'huge'; it has paper, smoke, quick, standard"):
         load_spec("table1", "huge")  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="neither a file"):
         load_spec(str(tmp_path))
@@ -63,6 +67,7 @@ def test_a_broken_file_is_refused_naming_it(tmp_path: Path, text: str, message: 
 
 SOUND = "benchmark='maze'\nname='x'\ntitle=''\ntasks=['g0>g1']\nstep_limits={2=50}\n"
 SOUND += "methods=['no-stitch']\n"
+MF = SOUND.replace("no-stitch", "mf-stitch") + "[mf_stitch]\n"
 
 
 def test_the_spec_below_is_sound(tmp_path: Path) -> None:
@@ -92,6 +97,9 @@ def test_the_spec_below_is_sound(tmp_path: Path) -> None:
         (SOUND.replace("''", "1979-05-27"), "title: expected str"),
         (SOUND + "# \udcff", "not valid TOML"),
         (SOUND + "rollout = " + 9999 * "[", "not valid TOML"),
+        (MF + "mixture = 'both'", "mixture: 'both' is not one of halves, joined"),
+        (MF + "training.policy_width = 7", r"layers of \[7, 7\] cannot be fine-tuned from"),
+        (MF + "[agent]\nmulti_task = false", "fine-tuned pair by pair; set training.multi_task"),
         (SOUND.replace("'x'", "'..'"), r"'\.\.' is no name"),
         (SOUND.replace("'x'", "'a/../../b'"), "'a/../../b' is no name"),
         (SOUND.replace("'x'", "'/etc/x'"), "'/etc/x' is no name"),

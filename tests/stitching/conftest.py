@@ -4,13 +4,9 @@ import pytest
 import torch
 from hypothesis import settings
 
-from stitching.data.experience import (
-    mixed_conditions,
-    mixed_experience,
-    skill_experience,
-    skill_pairs,
-)
+from stitching.data.experience import skill_experience
 from stitching.data.maze import MazeDataConfig, exploration, skill_demonstrations
+from stitching.data.mixtures import mixed_experience, skill_pairs
 from stitching.data.transitions import Transitions, concatenate
 from stitching.envs.maze import Maze
 from stitching.envs.protocol import conditions
@@ -54,9 +50,9 @@ def agent(maze: Maze, demonstrations: Transitions) -> Agent:
 
 @pytest.fixture(scope="session")
 def mf_policy(maze: Maze, demonstrations: Transitions) -> Agent:
-    experience = mixed_experience(demonstrations, conditions(maze))
+    experience = mixed_experience(demonstrations, conditions(maze), "halves")
     trained = train_iql(experience, maze.actions, TRAINING, "mf-policy")
-    return Agent(trained.weights, mixed_conditions(conditions(maze)), maze.actions)
+    return Agent(trained.weights, experience.conditions, maze.actions)
 
 
 @pytest.fixture(scope="session")

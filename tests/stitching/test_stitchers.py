@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import torch
 
-from stitching.data.experience import mixed_conditions, skill_pairs
+from stitching.data.mixtures import skill_pairs
 from stitching.envs.maze import Maze
 from stitching.envs.protocol import ActionSpace
 from stitching.models.agent import Agent
 from stitching.models.dynamics import Dynamics, DynamicsConfig
 from stitching.models.layers import init_mlp, prefixed
 from stitching.planning.cem import CEM
-from stitching.planning.objective import Norm
+from stitching.planning.objective import Norm, Price, conservative_value
 from stitching.planning.random_shooting import RandomShooting
 from stitching.stitchers import (
     MBStitch,
@@ -137,7 +137,8 @@ def linear_agent(
 
 def test_mf_stitch_asks_its_policy_about_the_ordered_pair() -> None:
     """This policy heads for the following skill and shuns the previous one."""
-    conditions = mixed_conditions(np.eye(4, dtype=np.float32))
+    one_hot = np.eye(4, dtype=np.float32)
+    conditions = np.array([[*one_hot[i], *one_hot[j]] for i, j in skill_pairs(4)])
     towards = np.concatenate([np.zeros((6, 4)), -50 * np.eye(4), 50 * np.eye(4)])
     policy = linear_agent(np.zeros((1, 14)), towards, conditions, MOVES)
     pairs = {pair: row for row, pair in enumerate(skill_pairs(4))}
@@ -202,22 +203,27 @@ def equation_2(
     stitcher: MBStitch,
 ) -> float:
     mean, std = model["observation_mean"].astype(np.float64), model["observation_std"]
-    ends = []
+    paths = []
     for member in range(MODELS):
-        imagined = state.astype(np.float64)
+        path = [state.astype(np.float64)]
         for action in actions:
-            inputs = np.concatenate([(imagined - mean) / std, action])
-            imagined = imagined + plain(model, "t", member, inputs) * std
-        ends.append(imagined)
-    average = np.mean(ends, axis=0)
+            inputs = np.concatenate([(path[-1] - mean) / std, action])
+            path.append(path[-1] + plain(model, "t", member, inputs) * std)
+        paths.append(path[1:])
+    average = np.mean([path[-1] for path in paths], axis=0)
     inputs = np.concatenate([(average - mean) / std, CONDITIONS[skill]])
     values = [plain(agent, "v", member, inputs)[0] for member in range(VALUES)]
-    spread = [np.std([end[k] / std[k] for end in ends]) for k in range(OBSERVATION)]
-    penalties = stitcher.alpha * np.std(values) + stitcher.beta * REDUCE[stitcher.norm](spread)
-    return np.mean(values) - penalties
+    disagreements = [
+        REDUCE[stitcher.norm](
+            [np.std([state[k] / std[k] for state in step]) for k in range(OBSERVATION)]
+        )
+        for step in zip(*paths, strict=True)
+    ]
+    disagreement = disagreements[-1] if stitcher.price == "end" else np.mean(disagreements)
+    return np.mean(values) - stitcher.alpha * np.std(values) - stitcher.beta * disagreement
 
 
-def mb_stitch(actions: ActionSpace, norm: Norm = "mean", **settings: float) -> MBStitch:
+def mb_stitch(actions: ActionSpace, norm: Norm = "mean", **settings: float | Price) -> MBStitch:
     agent, model = random_models(actions)
     config = DynamicsConfig(members=MODELS, width=8, hidden_layers=1)
     stitcher = MBStitch(
@@ -240,9 +246,12 @@ def planned_from(n: int = 4) -> np.ndarray:
 
 @pytest.mark.parametrize("space", [MOVES, ARM], ids=["discrete", "continuous"])
 @pytest.mark.parametrize("norm", ["mean", "l2", "max"])
+@pytest.mark.parametrize("price", ["end", "path"])
 @pytest.mark.parametrize(("horizon", "skill"), [(1, 0), (3, 1)])
-def test_the_score_is_equation_2(space: ActionSpace, norm: Norm, horizon: int, skill: int) -> None:
-    stitcher, states = mb_stitch(space, norm), planned_from()
+def test_the_score_is_equation_2(
+    space: ActionSpace, norm: Norm, price: Price, horizon: int, skill: int
+) -> None:
+    stitcher, states = mb_stitch(space, norm, price=price), planned_from()
     problems = torch.tensor([3, 0, 2])  # those that a planner still works on
     sequences = space.uniform(stream("actions"), (len(problems), 6, horizon))
     scores = stitcher.score(torch.from_numpy(states), skill)(problems, torch.from_numpy(sequences))
@@ -252,6 +261,31 @@ def test_the_score_is_equation_2(space: ActionSpace, norm: Norm, horizon: int, s
         for p, plan in zip(problems, sequences, strict=True)
     ]
     np.testing.assert_allclose(scores, expected, atol=1e-4)
+
+
+@pytest.mark.parametrize("norm", ["mean", "l2", "max"])
+def test_of_one_step_the_path_is_its_end(norm: Norm) -> None:
+    states, sequences = torch.from_numpy(planned_from()), ARM.uniform(stream("a"), (4, 6, 1))
+    end, path = (
+        mb_stitch(ARM, norm, price=price).score(states, 1)(
+            torch.arange(4), torch.from_numpy(sequences)
+        )
+        for price in ("end", "path")
+    )
+    assert torch.equal(end, path)
+
+
+@pytest.mark.parametrize("space", [MOVES, ARM], ids=["discrete", "continuous"])
+def test_the_price_of_the_end_is_that_of_the_imagined_state(space: ActionSpace) -> None:
+    """To the last bit: what planners maximise decides the bytes of results."""
+    stitcher, starts = mb_stitch(space), torch.from_numpy(planned_from(6))
+    sequences = torch.from_numpy(space.uniform(stream("actions"), (6, 5)))
+    scores = stitcher.score(starts, 1)(torch.arange(6), sequences[:, None])
+    imagined = stitcher.dynamics.imagine(starts, sequences)
+    expected = conservative_value(
+        stitcher.agent.values(imagined.mean(dim=0), 1), stitcher.dynamics.scaled(imagined), 2.0, 3.0
+    )
+    assert torch.equal(scores[:, 0], expected)
 
 
 @pytest.mark.parametrize(("alpha", "beta"), [(0.0, 0.0), (2.0, 3.0), (20.0, 0.0)])

@@ -8,13 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stitching.data.experience import (
-    Experience,
-    mixed_conditions,
-    mixed_experience,
-    skill_experience,
-    skill_pairs,
-)
+from stitching.data.experience import Experience, skill_experience
 from stitching.data.transitions import NO_SKILL, DataError, Transitions
 
 SKILLS = 3
@@ -66,25 +60,6 @@ def skill_rows(data: Transitions) -> list[Row]:
     return rows
 
 
-def mixed_rows(data: Transitions) -> list[Row]:
-    """For (i, j): second halves of i, no reward; first halves of j, 1 in the middle. Both end."""
-    rows = []
-    for i in range(SKILLS):
-        for j in range(SKILLS):
-            condition = (*CONDITIONS[i].tolist(), *CONDITIONS[j].tolist())
-            for number, (start, end) in enumerate(spans(data)):
-                middle = start + (end - start) // 2
-                if i == j or end - start < 2 or not data.episode_successes[number]:
-                    continue
-                if data.episode_skills[number] == i:
-                    rows += [(row, condition, 0.0, row == end - 1) for row in range(middle, end)]
-                if data.episode_skills[number] == j:
-                    for row in range(start, middle):
-                        arrives = row == middle - 1
-                        rows.append((row, condition, float(arrives), arrives))
-    return rows
-
-
 @given(st.lists(episode, min_size=1, max_size=8))
 def test_skill_experience(episodes: list[tuple[int, int, bool]]) -> None:
     data = dataset(episodes)
@@ -95,28 +70,8 @@ def test_skill_experience(episodes: list[tuple[int, int, bool]]) -> None:
             skill_experience(data, CONDITIONS)
 
 
-@given(st.lists(episode, min_size=1, max_size=8))
-def test_mixed_experience(episodes: list[tuple[int, int, bool]]) -> None:
-    data = dataset(episodes)
-    if expected := mixed_rows(data):
-        assert sorted(listed(mixed_experience(data, CONDITIONS))) == sorted(expected)
-    else:
-        with pytest.raises(DataError, match="no skill"):
-            mixed_experience(data, CONDITIONS)
-
-
-def test_a_single_skill_follows_itself() -> None:
-    """First halves earn, second halves do not; the missed episode is no example of either."""
-    data = dataset([(4, 0, True), (4, 0, False)])
-    own = CONDITIONS[:1]
-    assert mixed_conditions(own).tolist() == [[*own[0], *own[0]]]
-    rows = sorted(row for row, _, _, _ in listed(mixed_experience(data, own)))
-    assert rows == [0, 1, 2, 3]
-
-
-@pytest.mark.parametrize("make", [skill_experience, mixed_experience])
-def test_types_are_those_declared(make: type) -> None:
-    experience = make(dataset([(5, 0, True), (4, 1, False), (3, 2, True)]), CONDITIONS)
+def test_types_are_those_declared() -> None:
+    experience = skill_experience(dataset([(5, 0, True), (4, 1, False), (3, 2, True)]), CONDITIONS)
     dtypes = {
         "rows": np.int64,
         "condition_ids": np.int64,
@@ -132,25 +87,3 @@ def test_types_are_those_declared(make: type) -> None:
 def test_the_data_are_referred_to_not_copied() -> None:
     data = dataset([(4, 0, True), (4, 1, True)])
     assert skill_experience(data, CONDITIONS).data is data
-    assert mixed_experience(data, CONDITIONS).data is data
-
-
-def test_the_halves_of_an_odd_episode() -> None:
-    """Seven steps of skill 0: three in the first half, four in the second."""
-    data = dataset([(7, 0, True), (2, 1, True)])
-    experience = mixed_experience(data, CONDITIONS[:2])
-    leaving, arriving = skill_pairs(2).index((0, 1)), skill_pairs(2).index((1, 0))
-    rows, pairs = experience.rows, experience.condition_ids
-    assert rows[pairs == leaving].tolist() == [3, 4, 5, 6, 7]  # 7: the first half of skill 1
-    assert rows[pairs == arriving].tolist() == [8, 0, 1, 2]
-    assert experience.rewards[pairs == leaving].tolist() == [0, 0, 0, 0, 1]
-    assert experience.rewards[pairs == arriving].tolist() == [0, 0, 0, 1]
-
-
-def test_pairs_and_their_conditions_go_together() -> None:
-    pairs = skill_pairs(SKILLS)
-    assert sorted(pairs) == [(i, j) for i in range(SKILLS) for j in range(SKILLS) if i != j]
-    conditions = mixed_conditions(CONDITIONS)
-    assert conditions.dtype == np.float32
-    for (i, j), condition in zip(pairs, conditions, strict=True):
-        assert condition.tolist() == [*CONDITIONS[i].tolist(), *CONDITIONS[j].tolist()]

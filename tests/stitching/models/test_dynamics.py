@@ -231,10 +231,13 @@ def test_imagined_sequences_are_one_step_after_another(precision: Precision) -> 
     states = seen_from(np.argwhere(MAZE.free)[:6])
     moves = stream("moves").integers(len(MOVES), size=(6, 5))
     sequences = torch.eye(len(MOVES))[torch.from_numpy(moves)]
-    stepwise = states.unsqueeze(0)
+    stepwise = [states.unsqueeze(0)]
     for actions in sequences.unbind(dim=1):
-        stepwise = model(stepwise, actions)
-    imagined = model.imagine(states, sequences)
-    assert imagined.shape == (TINY.members, 6, MAZE.observation_size)
+        stepwise.append(model(stepwise[-1], actions))
+    path = model.imagine_path(states, sequences)
+    assert path.shape == (TINY.members, 5, 6, MAZE.observation_size)
     tolerance = 1e-5 if precision == "float32" else 1e-2
-    torch.testing.assert_close(imagined, stepwise, rtol=tolerance, atol=tolerance)
+    torch.testing.assert_close(
+        path, torch.stack(stepwise[1:], dim=1), rtol=tolerance, atol=tolerance
+    )
+    assert torch.equal(model.imagine(states, sequences), path[:, -1])

@@ -25,7 +25,7 @@ from stitching.models.iql import (
     train_iql,
     train_single_tasks,
 )
-from stitching.models.layers import Params, init_mlp
+from stitching.models.layers import Params, init_mlp, named, parameters
 from stitching.models.scale import observation_scale
 from stitching.streams import stream
 
@@ -376,6 +376,33 @@ def test_a_skill_by_itself_learns_from_nothing_else(space: ActionSpace) -> None:
     assert all(np.array_equal(w, first.weights[f"1.{n}"]) for n, w in alone.weights.items())
     with pytest.raises(DataError, match="nothing of skill 1"):
         replace(experience, condition_ids=np.zeros_like(own, dtype=np.int64)).of(1)
+
+
+@KINDS
+def test_a_policy_goes_on_from_another_and_the_values_do_not(space: ActionSpace) -> None:
+    experience, untrained = experience_of(space), replace(CONFIG, updates=0)
+    taught = train_iql(experience, space, CONFIG, "x").weights
+    before = {name: array.copy() for name, array in taught.items()}
+    fresh = train_iql(experience, space, untrained, "y").weights
+    for config in (untrained, CONFIG):
+        start = parameters(taught, "policy")
+        tuned = train_iql(experience, space, config, "y", policy_from=start).weights
+        moved = {n for n in tuned if n.startswith("policy.") and (tuned[n] != taught[n]).any()}
+        assert bool(moved) == (config is CONFIG)
+        if config is untrained:
+            assert all(np.array_equal(tuned[n], fresh[n]) for n in fresh if n[:2] in ("q.", "v."))
+    assert all(np.array_equal(taught[name], array) for name, array in before.items())
+
+
+def test_each_condition_goes_on_from_its_own_policy() -> None:
+    space = SPACES["continuous"]
+    experience, untrained = experience_of(space), replace(CONFIG, updates=0)
+    taught = train_single_tasks(experience, space, CONFIG, "x").weights
+    starts = [parameters(named(taught, skill), "policy") for skill in ("1", "0")]
+    tuned = train_single_tasks(experience, space, untrained, "y", policies_from=starts).weights
+    for condition, start in enumerate(starts):
+        for name, tensor in start.items():
+            assert np.array_equal(tuned[f"{condition}.policy.{name}"], tensor)
 
 
 def test_members_learn_apart() -> None:
