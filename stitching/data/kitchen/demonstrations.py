@@ -48,6 +48,7 @@ class KitchenDataConfig:
     source: Source = "orders"  # several skills in human orders, each alone, or people's recordings
     human: str = ""  # for people's: a Minari id such as D4RL/kitchen/complete-v2, or an .npz file
     episodes: int = 24  # demonstrations an order
+    first_weights: dict[str, float] = field(default_factory=dict)  # first skill → times as many
     held_out: int = 8  # more of each order, to judge models by
     quality: float = 0.9  # of the hand: from 1, a steady expert, down to 0
     qualities: dict[str, float] = field(default_factory=dict)  # skill → another quality for it
@@ -58,12 +59,19 @@ class KitchenDataConfig:
     keep_failures: bool = False  # keep the segment of a missed skill, as one without success
 
     def __post_init__(self) -> None:
-        unknown = sorted(self.qualities.keys() - set(SKILLS))
-        if unknown:
-            raise ValueError(f"qualities: no skill {unknown[0]!r}; there are {', '.join(SKILLS)}")
+        for name in ("first_weights", "qualities"):
+            if unknown := sorted(getattr(self, name).keys() - set(SKILLS)):
+                known = ", ".join(SKILLS)
+                raise ValueError(f"{name}: no skill {unknown[0]!r}; there are {known}")
         for name, share in {"elsewhere": self.elsewhere, **self.qualities}.items():
             if not 0 <= share <= 1:
                 raise ValueError(f"{name}: must lie in [0, 1]")
+        if any(weight < 0 for weight in self.first_weights.values()) or self.wait < 0:
+            raise ValueError("first_weights and wait: must not be negative")
+
+    def demonstrations(self, order: Order) -> int:
+        """How many demonstrations of an order a dataset holds."""
+        return round(self.episodes * self.first_weights.get(order[0], 1.0))
 
     def style(self, skill: str) -> Style:
         """How a demonstrator's hand varies in a skill."""
@@ -174,7 +182,9 @@ def _achieved(block: KitchenBlock, rows: np.ndarray) -> np.ndarray:
 
 def orders(config: KitchenDataConfig) -> tuple[Order, ...]:
     """What scripted demonstrators are asked to do; beside people's data, what judges models."""
-    return tuple((name,) for name in SKILLS) if config.source == "single-skill" else human_orders()
+    single = config.source == "single-skill"
+    asked = tuple((name,) for name in SKILLS) if single else human_orders()
+    return tuple(order for order in asked if config.demonstrations(order))
 
 
 def play(
@@ -184,7 +194,7 @@ def play(
 
     An episode depends on the configuration, the seed, its order and its number alone.
     """
-    numbers = range(config.episodes) if episodes is None else episodes
+    numbers = range(config.demonstrations(order)) if episodes is None else episodes
     labels = [("demonstrations", "kitchen", seed, "-".join(order), e) for e in numbers]
     block = KITCHEN.block()
     block.reset([stream("environment", *label) for label in labels])
@@ -202,11 +212,15 @@ def held_out(config: KitchenDataConfig, seed: int) -> tuple[Transitions, np.ndar
 
     The skills that succeeded (E episodes), and their snapshots (E, snapshot) float64.
     """
-    numbers = range(config.episodes, config.episodes + config.held_out)
+
+    def numbers(order: Order) -> range:
+        shown = config.demonstrations(order)
+        return range(shown, shown + config.held_out)
+
     segments = [
         segment
         for order in orders(config)
-        for one in play(config, order, seed, numbers)
+        for one in play(config, order, seed, numbers(order))
         for segment in one
         if segment.success
     ]
