@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -146,6 +147,70 @@ def test_the_hand_goes_home_between_skills_if_it_shall(return_home: bool) -> Non
     (second,) = data.episode_rows(SKILLS.index("light switch"))
     nearest = np.abs(data.observations[second, :7] - START[:7]).max(axis=1).min()
     assert (nearest < 0.35) == return_home
+
+
+def starts(data: Transitions) -> np.ndarray:
+    """The arm's joints where each skill begins: (E, 7) rad."""
+    return data.observations[data.episode_starts, :7]
+
+
+def test_skills_can_begin_elsewhere_than_where_one_ended() -> None:
+    order = ("bottom burner", "light switch")
+    usual, elsewhere = (
+        collect(replace(CONFIG, episodes=2, elsewhere=share), [order], seed=0) for share in (0, 1)
+    )
+    check(elsewhere, KITCHEN, "data")
+    for data in (usual, elsewhere):
+        assert [SKILLS[skill] for skill in data.episode_skills] == 2 * list(order)
+    apart = {
+        name: np.abs(starts(data)[1::2] - data.next_observations[data.episode_ends - 1][::2, :7])
+        for name, data in (("usual", usual), ("elsewhere", elsewhere))
+    }
+    assert apart["usual"].max() < 0.02 < 0.2 < apart["elsewhere"].max(axis=1).min()
+    assert np.abs(starts(elsewhere)[1] - starts(elsewhere)[3]).max() > 0.2  # each at its own
+    first = slice(0, elsewhere.episode_ends[0])
+    assert elsewhere.actions[first].tobytes() == usual.actions[first].tobytes()
+
+
+def test_a_demonstration_can_wait_before_it_moves() -> None:
+    waiting = collect(replace(CONFIG, wait=16), SHORT_ORDERS[:1], seed=0)
+    still = np.abs(waiting.observations[:, :7] - waiting.observations[0, :7]).max(axis=1) < 0.05
+    assert 8 <= np.argmin(still) <= 20
+    hasty = collect(CONFIG, SHORT_ORDERS[:1], seed=0)
+    assert len(hasty) < len(waiting)
+
+
+def test_a_skill_can_have_a_hand_of_its_own() -> None:
+    config = replace(CONFIG, quality=1.0, qualities={"kettle": 0.0})
+    assert config.style("kettle") == replace(CONFIG, quality=0.0).style("microwave")
+    assert config.style("microwave") == replace(CONFIG, quality=1.0).style("kettle")
+    own = collect(config, SHORT_ORDERS[1:], seed=0)
+    assert same_bytes(own, collect(replace(CONFIG, quality=1.0), SHORT_ORDERS[1:], seed=0))
+
+
+def test_orders_have_more_or_fewer_demonstrations_by_their_first_skill() -> None:
+    config = replace(CONFIG, episodes=2, first_weights={"kettle": 0, "microwave": 1.5})
+    assert [
+        config.demonstrations((first,)) for first in ("kettle", "microwave", "bottom burner")
+    ] == [0, 3, 2]
+    assert {order[0] for order in orders(config)} == {"microwave", "bottom burner"}
+    assert len(play(replace(config, skill_steps=1), ("microwave",), seed=0)) == 3
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ({"qualities": {"toaster": 0.5}}, "qualities: no skill 'toaster'"),
+        ({"first_weights": {"toaster": 0.5}}, "first_weights: no skill 'toaster'"),
+        ({"qualities": {"kettle": 1.5}}, "kettle: must lie in"),
+        ({"elsewhere": -0.1}, "elsewhere: must lie in"),
+        ({"first_weights": {"kettle": -1.0}}, "must not be negative"),
+        ({"wait": -1}, "must not be negative"),
+    ],
+)
+def test_settings_out_of_range_are_refused(setting: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        replace(CONFIG, **setting)
 
 
 def test_a_poor_hand_is_worse_than_an_expert() -> None:

@@ -24,8 +24,10 @@ SHARED = Path(__file__).resolve().parents[4] / "shared"
 REAL = SHARED / "data/kitchen_complete_v2_minari.npz"
 
 
-def episode(steps: int, **achieved: tuple[int, ...]) -> Episode:
+def episode(steps: int, relocating: slice = slice(0), **achieved: tuple[int, ...]) -> Episode:
     """An episode in which a skill, named by its first word, holds in the given states."""
+    moved = np.zeros(steps, dtype=bool)
+    moved[relocating] = True
     holds = np.zeros((steps + 1, len(SKILLS)), dtype=bool)
     for word, states in achieved.items():
         skill = next(i for i, name in enumerate(SKILLS) if name.startswith(word))
@@ -35,7 +37,7 @@ def episode(steps: int, **achieved: tuple[int, ...]) -> Episode:
         np.zeros((steps, 9)),
         holds,
         np.zeros((steps + 1, 0)),
-        np.zeros(steps, dtype=bool),
+        moved,
     )
 
 
@@ -46,6 +48,24 @@ def cuts(shown: Episode, order: tuple[str, ...] = ()) -> list[tuple[str, int, in
 def test_skills_end_where_first_achieved_though_later_undone() -> None:
     shown = episode(9, kettle=(7, 8), microwave=(3, 4, 8))
     assert cuts(shown) == [("microwave", 0, 3, True), ("kettle", 3, 7, True)]
+
+
+def test_a_skill_begins_where_the_arm_was_taken() -> None:
+    order = ("kettle", "light switch", "slide cabinet")
+    shown = episode(9, relocating=slice(2, 5), kettle=(2,), light=(7,))
+    done = [("kettle", 0, 2, True), ("light switch", 5, 7, True)]
+    assert cuts(shown, order) == [*done, ("slide cabinet", 7, 9, False)]
+    assert cuts(episode(9, relocating=slice(7, 8), kettle=(2,), light=(7,)), order) == [
+        ("kettle", 0, 2, True),
+        ("light switch", 2, 7, True),
+        ("slide cabinet", 8, 9, False),
+    ]
+
+
+def test_a_skill_that_came_about_on_the_way_elsewhere_has_no_segment() -> None:
+    shown = episode(9, relocating=slice(2, 5), kettle=(2,), light=(5,), slide=(8,))
+    order = ("kettle", "light switch", "slide cabinet")
+    assert cuts(shown, order) == [("kettle", 0, 2, True), ("slide cabinet", 5, 8, True)]
 
 
 def test_what_held_from_the_start_is_no_skill() -> None:
