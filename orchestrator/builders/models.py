@@ -7,6 +7,7 @@ from typing import Any
 from orchestrator.builders.parts import Inputs
 from orchestrator.structure import Plain, structure
 from stitching.data.experience import mixed_conditions
+from stitching.data.uncut import no_conditions
 from stitching.envs.protocol import Benchmark, conditions
 from stitching.models.agent import Agent
 from stitching.models.dynamics import Dynamics, DynamicsConfig
@@ -21,6 +22,9 @@ def load_models(benchmark: Benchmark, configs: Plain, artifacts: Inputs) -> dict
         elif kind == "mf-policy":
             pairs = mixed_conditions(conditions(benchmark))
             models[kind] = Agent(artifact.arrays, pairs, benchmark.actions)
+        elif kind == "single-policy":
+            unconditioned = no_conditions(len(benchmark.skills))
+            models[kind] = Agent(artifact.arrays, unconditioned, benchmark.actions)
         elif kind == "dynamics":
             config = structure(DynamicsConfig, configs[kind], kind)
             models[kind] = Dynamics(artifact.arrays, config)
