@@ -13,7 +13,7 @@ import numpy as np
 
 from stitching.data.kitchen.demonstrations import Demonstrator, KitchenDataConfig, demonstrate
 from stitching.data.kitchen.segments import Episode, Order, Segment, as_transitions, cut
-from stitching.data.transitions import NO_SKILL, Transitions
+from stitching.data.transitions import NO_SKILL, DataError, Transitions
 from stitching.envs.kitchen import KITCHEN
 from stitching.streams import stream
 
@@ -23,11 +23,16 @@ TOGETHER = 40  # demonstrations played at once: a matter of memory, no episode d
 def long_horizon_data(
     config: KitchenDataConfig, order: Order, seed: int
 ) -> tuple[Transitions, np.ndarray]:
-    """Whole demonstrations of an order, and rewards (N,) float32: 1 at each accomplishment."""
+    """Whole demonstrations of an order, and rewards (N,) float32: 1 at each accomplishment.
+
+    Raises DataError where there is none.
+    """
     demonstrated = (cut(episode, order) for episode in _played(config, order, seed))
     tasks = [
         skills for skills in demonstrated if [s.success for s in skills] == [True] * len(order)
     ]
+    if not tasks:
+        raise DataError(f"no demonstration of {'>'.join(order)} accomplishes all of it in order")
     whole = [Segment(s[0].episode, 0, s[-1].end, NO_SKILL, success=True) for s in tasks]
     data = as_transitions(whole)
     rewards = np.zeros(len(data), dtype=np.float32)
