@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from analysis.orders import Cells, by_order, order_duels
 from analysis.paper import paper_scores
 from analysis.rows import column_labels, place_tasks
 from analysis.run import RunSpec, TableEntry
@@ -29,6 +30,7 @@ class Table:
     scores: pd.DataFrame  # SCORE_COLUMNS, one row a cell
     gains: pd.DataFrame  # GAIN_COLUMNS
     leads: pd.DataFrame  # GAIN_COLUMNS: the paper's leader of each row over its best other
+    orders: pd.DataFrame  # GAIN_COLUMNS: Table 4's leaders by order of skills, no line elsewhere
     expected: dict[tuple[str, str], int]  # (row, method) -> episodes of a complete cell
     labels: dict[str, str]  # method -> how the table's head calls it
 
@@ -58,6 +60,7 @@ def build_table(episodes: pd.DataFrame, spec: RunSpec, entry: TableEntry) -> Tab
     """Gathers episodes into cells, and compares the methods within each row."""
     places = place_tasks(spec, entry)
     cells = _cells(episodes, places)
+    orders = by_order(cells)
     scores = score_table(cells, entry)
     tasks_of_cell = Counter(zip(places["row"], places["column"], strict=True))
     labels = column_labels(spec)
@@ -70,15 +73,12 @@ def build_table(episodes: pd.DataFrame, spec: RunSpec, entry: TableEntry) -> Tab
         scores=scores,
         gains=_only(gains, gain_pairs),
         leads=_only(gains, lead_pairs),
+        orders=gain_table(orders, order_duels(orders, entry.paper), entry),
         expected={
             cell: tasks * len(spec.seeds) * spec.episodes for cell, tasks in tasks_of_cell.items()
         },
         labels={method: labels.get(method, method) for method in scores["method"].unique()},
     )
-
-
-Cells = dict[tuple[str, str], pd.DataFrame]
-"""(row, method) -> its episodes; rows and methods in the table's order."""
 
 
 def _cells(episodes: pd.DataFrame, places: pd.DataFrame) -> Cells:

@@ -1,6 +1,8 @@
 """Does a run agree with the paper? Cell by cell, and claim by claim."""
 
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -76,26 +78,45 @@ def cell_verdicts(scores: pd.DataFrame) -> list[str]:
 
 def claims(table: Table) -> list[Claim]:
     """All claims of the paper's table that the run can speak to."""
-    return [*_leads(table), *_constant_skills(table)]
+    return [*_orders(table), *_leads(table), *_constant_skills(table)]
+
+
+def _orders(table: Table) -> list[Claim]:
+    """Table 4: who leads the tasks that keep the demonstrations' order, and who the others."""
+    return [
+        _lead(
+            table,
+            lead,
+            f"{lead['row']} → {table.labels[lead['method']]} leads",
+            "on average over these tasks",
+        )
+        for lead in table.orders.to_dict("records")
+    ]
 
 
 def _leads(table: Table) -> list[Claim]:
     """The paper's best method of each row is the best here, too."""
-    found = []
-    for lead in table.leads.to_dict("records"):
-        leader, rival = table.labels[lead["method"]], table.labels[lead["baseline"]]
-        if lead["pairs"] == 0:
-            verdict, detail = NO_DATA, "no episode played by both"
-        else:
-            verdict = _side(lead["ci_low"], lead["ci_high"])
-            detail = (
-                f"{lead['gain']:+.3f} [{lead['ci_low']:+.3f}, {lead['ci_high']:+.3f}] over "
-                f"{rival}, the best here of the paper's others "
-                f"({_seeds(lead['seeds'])}, {lead['pairs']:,} paired episodes)"
-            )
-        text = f"{leader} leads “{lead['row']}”"
-        found.append(Claim(text, verdict, detail, lead["seeds"]))
-    return found
+    return [
+        _lead(
+            table,
+            lead,
+            f"{table.labels[lead['method']]} leads “{lead['row']}”",
+            "the best here of the paper's others",
+        )
+        for lead in table.leads.to_dict("records")
+    ]
+
+
+def _lead(table: Table, lead: Mapping[Hashable, Any], text: str, about: str) -> Claim:
+    """A line of GAIN_COLUMNS as a claim that the method is ahead."""
+    if lead["pairs"] == 0:
+        return Claim(text, NO_DATA, "no episode played by both", lead["seeds"])
+    detail = (
+        f"{lead['gain']:+.3f} [{lead['ci_low']:+.3f}, {lead['ci_high']:+.3f}] over "
+        f"{table.labels[lead['baseline']]}, {about} "
+        f"({_seeds(lead['seeds'])}, {lead['pairs']:,} paired episodes)"
+    )
+    return Claim(text, _side(lead["ci_low"], lead["ci_high"]), detail, lead["seeds"])
 
 
 def _side(low: float, high: float) -> str:

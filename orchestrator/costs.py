@@ -10,6 +10,7 @@ from typing import Literal
 from orchestrator.jobs import BlockTask
 from orchestrator.kits import KITS
 from orchestrator.ledger import Ledger, Played
+from orchestrator.methods import method_rollout
 from orchestrator.plan import Node, Plan
 from orchestrator.recipes import Recipe
 from orchestrator.spec import Spec
@@ -66,8 +67,10 @@ def estimate(plan: Plan, store: Store, shared: Ledger) -> Estimate:
 
     runs = len(spec.methods) * spec.seeds * spec.episodes
     naive_segments = sum(len(task) for task in spec.all_tasks) * runs
-    naive_steps = runs * sum(
-        min(spec.step_limits[len(task)], len(task) * _skill_limit(spec)) for task in spec.all_tasks
+    naive_steps = sum(
+        min(spec.step_limits[len(task)], len(task) * _skill_limit(spec, method))
+        for method in spec.methods
+        for task in spec.all_tasks
     )
     return Estimate(
         artifacts={kind: (c[True], c[False]) for kind, c in artifacts.items()},
@@ -76,7 +79,7 @@ def estimate(plan: Plan, store: Store, shared: Ledger) -> Estimate:
         segments_in_tree=len(plan.nodes) * spec.episodes,
         segments_naive=naive_segments,
         steps_in_tree=_steps_in_tree(plan),
-        steps_naive=naive_steps,
+        steps_naive=naive_steps * spec.seeds * spec.episodes,
         seconds_training=training,
         seconds_evaluation=evaluation,
         segments_missing=round(missing_segments),
@@ -142,9 +145,9 @@ def _reference_seconds(recipe: Recipe) -> float:
     return costs.whole.get(recipe.kind, OTHER_SECONDS)
 
 
-def _skill_limit(spec: Spec) -> int:
-    """Most steps of one skill: its own limit, or the task's where it has none."""
-    return spec.rollout.skill_limit or spec.step_limit
+def _skill_limit(spec: Spec, method: str) -> int:
+    """Most steps of one skill of a method: its own limit, or the task's where it has none."""
+    return method_rollout(method, spec.rollout).skill_limit or spec.step_limit
 
 
 def _steps_in_tree(plan: Plan) -> int:
@@ -154,9 +157,13 @@ def _steps_in_tree(plan: Plan) -> int:
     and nothing above it, bounds the sum.
     """
     spec = plan.spec
-    leaves = sum(1 for node in plan.nodes if node not in plan.children)
-    by_skill = len(plan.nodes) * _skill_limit(spec)
-    return spec.episodes * min(leaves * spec.step_limit, by_skill)
+    by_limit: dict[int, list[Node]] = {}
+    for node in plan.nodes:
+        by_limit.setdefault(_skill_limit(spec, node.method), []).append(node)
+    return spec.episodes * sum(
+        min(sum(node not in plan.children for node in nodes) * spec.step_limit, len(nodes) * limit)
+        for limit, nodes in by_limit.items()
+    )
 
 
 def _training_history(store: Store) -> dict[tuple[str, str], float]:

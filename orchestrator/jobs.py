@@ -32,13 +32,13 @@ class BlockTask:
     benchmark: str
     root_seed: int
     seed: int
-    method: str  # "" for first skills that are not stitched to
-    stitcher: Plain  # the method's configuration; empty where that is ""
+    method: str  # "" for first skills that methods share
+    stitcher: Plain  # the method's configuration; empty for those
     prefix: tuple[str, ...]
     episodes: tuple[int, int]  # first and one past the last, of the whole block
     step_limit: int
     rollout: Plain
-    artifacts: dict[str, str]  # kind → key: agent, and what the stitcher needs
+    artifacts: dict[str, str]  # kind → key: the policies, and what the stitcher needs
     configs: Plain  # kind → how it was trained, where loading it needs to know
 
     @property

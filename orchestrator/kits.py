@@ -60,6 +60,7 @@ class Kit:
     extras: dict[str, str] = field(default_factory=dict)  # data not learned from: role → kind
     for_extras: tuple[str, ...] = ()  # settings of the data that no dataset learned from depends on
     illustrations: dict[str, Illustration] = field(default_factory=dict)  # by name
+    long_horizon: Callable[[Any], str] = lambda config: ""  # kind of Single-Policy's data, if any
     label: Callable[[Any], str] = lambda config: ""  # of unusual data; every table shows it
 
 
@@ -84,6 +85,11 @@ def _kitchen_datasets(config: KitchenDataConfig) -> dict[str, Dataset]:
         f"demonstrations-{short_order(order)}": Dataset("kitchen-demonstrations", {"order": order})
         for order in orders(config)
     }
+
+
+def _kitchen_long_horizon(config: KitchenDataConfig) -> str:
+    """People's recordings do not hold any one task often enough."""
+    return "" if config.source == "human" else "kitchen-long-horizon"
 
 
 def _kitchen_label(config: KitchenDataConfig) -> str:
@@ -163,8 +169,17 @@ KITS: dict[str, Kit] = {
         KitchenDataConfig,
         _kitchen_datasets,
         Costs(
-            update={"agent": 0.026, "mf-policy": 0.016, "dynamics": 0.011},
-            demonstration={"kitchen-demonstrations": 0.6, "kitchen-held-out": 15.0},
+            update={
+                "agent": 0.026,
+                "mf-policy": 0.016,
+                "single-policy": 0.016,
+                "dynamics": 0.011,
+            },
+            demonstration={
+                "kitchen-demonstrations": 0.6,
+                "kitchen-long-horizon": 0.6,
+                "kitchen-held-out": 15.0,
+            },
             whole={
                 "kitchen-anatomy": 300.0,
                 "kitchen-diagnosis": 120.0,
@@ -183,6 +198,7 @@ KITS: dict[str, Kit] = {
             pairs=20,
             episodes=6,
         ),
+        long_horizon=_kitchen_long_horizon,
         label=_kitchen_label,
     ),
     "robosuite-door": _robosuite_kit("open door", "close door"),

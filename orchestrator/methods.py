@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from orchestrator.errors import UsageError
 from orchestrator.structure import structure
 from stitching.data.mixtures import Mixture, skill_pairs
-from stitching.envs.protocol import Benchmark
+from stitching.envs.first_times import FirstTimes
+from stitching.envs.protocol import Benchmark, EpisodeBlock
 from stitching.models.agent import Agent
 from stitching.models.dynamics import Dynamics
 from stitching.models.iql import IQLConfig
@@ -58,6 +59,15 @@ class MBStitchConfig:
         return (self.cem if self.planner == "cem" else self.random_shooting).horizon
 
 
+@dataclass(frozen=True)
+class SinglePolicyConfig:
+    """One policy that is not told which skill is asked for (4.3.1): it takes no skill's vector."""
+
+    task: str = ""  # what its demonstrations show, in this order and uncut: "a>b>c"
+    episodes: int = 240  # demonstrations
+    training: IQLConfig = IQLConfig()
+
+
 def check_start(config: MFStitchConfig, agent: IQLConfig, where: str) -> None:
     """Refuse to fine-tune a policy that could not be the one that the skills are learned by."""
     if config.mixture != "fine-tuned":
@@ -75,7 +85,10 @@ def check_start(config: MFStitchConfig, agent: IQLConfig, where: str) -> None:
         )
 
 
-MethodConfig = NoStitchConfig | RandomStitchConfig | MFStitchConfig | MBStitchConfig
+MethodConfig = (
+    NoStitchConfig | RandomStitchConfig | MFStitchConfig | MBStitchConfig | SinglePolicyConfig
+)
+SKILLS = "agent"  # the kind of artifact whose policies are told which skill is asked for
 
 
 @dataclass(frozen=True)
@@ -83,7 +96,18 @@ class Method:
     label: str
     config: type[MethodConfig]
     stitcher: type[Stitcher]
-    needs: tuple[str, ...] = ()  # kinds of artifacts beside the agent
+    needs: tuple[str, ...] = ()  # kinds of artifacts beside the policy
+    policy: str = SKILLS  # kind of the artifact that executes skills
+
+    @property
+    def told(self) -> bool:
+        """Whether its policy is told which skill is asked for."""
+        return self.policy == SKILLS
+
+    @property
+    def artifacts(self) -> tuple[str, ...]:
+        """Kinds of the artifacts that it is played with."""
+        return (self.policy, *self.needs)
 
 
 METHODS: dict[str, Method] = {
@@ -91,16 +115,45 @@ METHODS: dict[str, Method] = {
     "random-stitch": Method("Random-Stitch", RandomStitchConfig, RandomStitch),
     "mf-stitch": Method("MF-Stitch", MFStitchConfig, MFStitch, needs=("mf-policy",)),
     "mb-stitch": Method("MB-Stitch", MBStitchConfig, MBStitch, needs=("dynamics",)),
+    "single-policy": Method("Single-Policy", SinglePolicyConfig, NoStitch, policy="single-policy"),
 }
 
 
-def first_method(method: str, rollout: RolloutConfig) -> str:
-    """Whose a method's first skills are: its own where it stitches to them, else "".
+SHARED_FIRST = Method("first skills, shared", NoStitchConfig, NoStitch)
 
-    Methods that do not stitch before a first skill play it alike, and share it.
+
+def method_of(method: str) -> Method:
+    """Its entry; the first skills that methods share have method ""."""
+    return METHODS[method_name(method)] if method else SHARED_FIRST
+
+
+def first_method(method: str, rollout: RolloutConfig) -> str:
+    """Whose a method's first skills are: its own where it plays them in a way of its own, else "".
+
+    Methods that execute skills by the same policies and do not stitch before a first one play it
+    alike, and share it.
     """
-    own = rollout.first_stitch and METHODS[method_name(method)].stitcher.before_first
+    how = method_of(method)
+    own = not how.told or (rollout.first_stitch and how.stitcher.before_first)
     return method if own else ""
+
+
+def method_rollout(method: str, rollout: RolloutConfig) -> RolloutConfig:
+    """How a method's skills are executed.
+
+    Where the policy is not told which skill is asked for, others may come in between: only the
+    task's limit binds it.
+    """
+    return rollout if method_of(method).told else replace(rollout, skill_limit=0)
+
+
+def method_block(method: str, benchmark: Benchmark) -> EpisodeBlock:
+    """A new block of episodes, in which a method's skills are accomplished as is right for it.
+
+    What a policy did before it was asked for, since nobody told it what to do, does not count.
+    """
+    block = benchmark.block()
+    return block if method_of(method).told else FirstTimes(block, len(benchmark.skills))
 
 
 def parse_method(method: str) -> tuple[str, dict[str, Any]]:
@@ -145,11 +198,9 @@ def make_stitcher(
 ) -> Stitcher:
     """The stitcher of a method, from its plain settings and the models it needs, by kind.
 
-    First skills that are not stitched to have method "": the same for every method.
+    The first skills that methods share have method "": nothing is stitched there.
     """
-    if not method:
-        return NoStitch()
-    config = structure(METHODS[method_name(method)].config, settings, f"method {method}")
+    config = structure(method_of(method).config, settings, f"method {method}")
     if isinstance(config, RandomStitchConfig):
         return RandomStitch(benchmark.actions, config.limit)
     if isinstance(config, MFStitchConfig):

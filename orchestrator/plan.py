@@ -11,7 +11,15 @@ from typing import Any
 from orchestrator.builders import BLOCK_CODE, BLOCK_SETUP
 from orchestrator.jobs import BlockTask
 from orchestrator.kits import KITS, TEACHING, Illustration
-from orchestrator.methods import METHODS, MFStitchConfig, first_method, method_name
+from orchestrator.methods import (
+    SKILLS,
+    MFStitchConfig,
+    SinglePolicyConfig,
+    first_method,
+    method_name,
+    method_of,
+    method_rollout,
+)
 from orchestrator.recipes import Recipe, code_fingerprint, digest
 from orchestrator.spec import Spec
 from orchestrator.structure import Plain, to_plain
@@ -24,7 +32,7 @@ class Node:
     """One more skill for the episodes that survived a prefix."""
 
     seed: int
-    method: str  # "" for first skills that are not stitched to: those of every such method
+    method: str  # "" for the first skills that methods share
     prefix: Prefix
     parent: Node | None = field(default=None, compare=False, repr=False)
 
@@ -38,6 +46,7 @@ class Plan:
     agents: dict[int, str]  # seed → key
     dynamics: dict[int, str]
     mf_policies: dict[tuple[int, str], str]  # (seed, method) → key
+    single_policies: dict[tuple[int, str], str]
     datasets: dict[str, str]  # role → key
     illustrations: dict[str, str]  # name → key
     nodes: tuple[Node, ...]
@@ -45,8 +54,13 @@ class Plan:
     @cached_property
     def scored_kinds(self) -> set[str]:
         """Kinds of the artifacts that scores depend on, which illustrations are not among."""
-        models = (self.agents, self.dynamics, self.mf_policies, self.datasets)
-        return {self.recipes[key].kind for keys in models for key in keys.values()}
+        return {self.recipes[key].kind for key in (*self.models, *self.datasets.values())}
+
+    @property
+    def models(self) -> set[str]:
+        """Keys of all that is trained."""
+        own = {*self.mf_policies.values(), *self.single_policies.values()}
+        return {*self.agents.values(), *self.dynamics.values(), *own}
 
     @cached_property
     def chunks(self) -> list[tuple[int, int]]:
@@ -74,8 +88,8 @@ class Plan:
     @property
     def needed(self) -> set[str]:
         """Artifacts that the numbers depend on: all but what is only looked at."""
-        used = {*self.agents.values(), *self.dynamics.values(), *self.mf_policies.values()}
-        return used | {key for made in used for key in self.recipes[made].inputs.values()}
+        inputs = (self.recipes[made].inputs.values() for made in self.models)
+        return self.models.union(*inputs)
 
     def roots(self) -> Iterator[Node]:
         return (node for node in self.nodes if node.parent is None)
@@ -84,19 +98,24 @@ class Plan:
     def _plain(self) -> Plain:
         """Plain settings by what they are of: a paper's table has a hundred thousand blocks."""
         methods = {method: self.spec.method_config(method) for method in self.spec.methods}
-        parts = {"rollout": self.spec.rollout, "dynamics": self.spec.dynamics, **methods}
+        parts = {"dynamics": self.spec.dynamics, **methods}
         return {name: to_plain(part) for name, part in parts.items()}
+
+    @cached_property
+    def _rollouts(self) -> Plain:
+        """Likewise how skills are executed, by method."""
+        methods = ("", *self.spec.methods)
+        return {method: to_plain(method_rollout(method, self.spec.rollout)) for method in methods}
+
+    def _artifact(self, kind: str, node: Node) -> str:
+        """Key of the artifact of a kind that a node's blocks are played with."""
+        for_all = {"agent": self.agents, "dynamics": self.dynamics}
+        own = {"mf-policy": self.mf_policies, "single-policy": self.single_policies}
+        return for_all[kind][node.seed] if kind in for_all else own[kind][node.seed, node.method]
 
     def _task(self, node: Node, episodes: tuple[int, int]) -> BlockTask:
         spec = self.spec
-        artifacts = {"agent": self.agents[node.seed]}
-        if node.method:
-            for kind in METHODS[method_name(node.method)].needs:
-                artifacts[kind] = (
-                    self.dynamics[node.seed]
-                    if kind == "dynamics"
-                    else self.mf_policies[node.seed, node.method]
-                )
+        artifacts = {kind: self._artifact(kind, node) for kind in method_of(node.method).artifacts}
         content = {
             "benchmark": spec.benchmark,
             "root_seed": spec.root_seed,
@@ -108,7 +127,7 @@ class Plan:
             "prefix": node.prefix,
             "episodes": episodes,
             "step_limit": spec.step_limit,
-            "rollout": self._plain["rollout"],
+            "rollout": self._rollouts[node.method],
             "artifacts": artifacts,
             "configs": {kind: self._plain[kind] for kind in artifacts if kind == "dynamics"},
         }
@@ -129,20 +148,20 @@ def make_plan(spec: Spec) -> Plan:
     kit = KITS[spec.benchmark]
     settings = to_plain(spec.data)
     learned_from = {name: x for name, x in settings.items() if name not in kit.for_extras}
-    made = kit.datasets(spec.data)
+    needed = {kind for method in spec.methods for kind in method_of(method).artifacts}
+    made = kit.datasets(spec.data) if SKILLS in needed else {}
     datasets = {
         role: add(one.kind, {"config": learned_from, **root, **one.params})
         for role, one in made.items()
     }
     demonstrations = {role: datasets[role] for role, one in made.items() if one.teaches}
-    seeds = range(spec.seeds)
+    seeds = range(spec.seeds if SKILLS in needed else 0)
     agents = {
         seed: add("agent", {"config": to_plain(spec.agent), "seed": seed, **root}, demonstrations)
         for seed in seeds
     }
-    needed = {kind for method in spec.methods for kind in METHODS[method_name(method)].needs}
-    dynamics, mf_policies = {}, {}
-    for seed in seeds:
+    dynamics, mf_policies, single_policies, long_horizon = {}, {}, {}, {}
+    for seed in range(spec.seeds):
         if "dynamics" in needed:
             params = {"config": to_plain(spec.dynamics), "seed": seed, **root}
             dynamics[seed] = add("dynamics", params, datasets)
@@ -153,6 +172,13 @@ def make_plan(spec: Spec) -> Plan:
                 params["mixture"] = config.mixture
                 start = {"agent": agents[seed]} if config.mixture == "fine-tuned" else {}
                 mf_policies[seed, method] = add("mf-policy", params, demonstrations | start)
+            if isinstance(config, SinglePolicyConfig):
+                shown = {"config": learned_from | {"episodes": config.episodes}, **root}
+                shown |= {"order": config.task.split(">")}
+                key = add(kit.long_horizon(spec.data), shown)
+                long_horizon[f"demonstrations of {method}"] = key
+                params = {"config": to_plain(config.training), "seed": seed, **root}
+                single_policies[seed, method] = add("single-policy", params, {"long-horizon": key})
     illustrations = {}
     if "dynamics" in needed:
         extras = {
@@ -164,7 +190,15 @@ def make_plan(spec: Spec) -> Plan:
             inputs = {role: there[role] for role in chain.from_iterable(roles)}
             illustrations[name] = add(one.kind, _illustrated(spec, one), inputs)
     return Plan(
-        spec, recipes, agents, dynamics, mf_policies, datasets, illustrations, tuple(_nodes(spec))
+        spec,
+        recipes,
+        agents,
+        dynamics,
+        mf_policies,
+        single_policies,
+        datasets | long_horizon,
+        illustrations,
+        tuple(_nodes(spec)),
     )
 
 

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from importlib import resources
-from importlib.resources.abc import Traversable
 from itertools import permutations
 from pathlib import Path
 from typing import Any, Literal
@@ -24,11 +22,13 @@ from orchestrator.methods import (
     MethodConfig,
     MFStitchConfig,
     RandomStitchConfig,
+    SinglePolicyConfig,
     check_start,
     method_name,
     parse_method,
 )
 from orchestrator.structure import Plain, merged, nested, structure, to_plain
+from orchestrator.tomls import based_fields, read_toml, toml_names
 from stitching.envs.registry import BENCHMARKS
 from stitching.models.dynamics import DynamicsConfig
 from stitching.models.iql import IQLConfig
@@ -73,6 +73,7 @@ class Spec:
     random_stitch: RandomStitchConfig = RandomStitchConfig()
     mf_stitch: MFStitchConfig = MFStitchConfig()
     mb_stitch: MBStitchConfig = MBStitchConfig()
+    single_policy: SinglePolicyConfig = SinglePolicyConfig()
     tables: tuple[TableSpec, ...] = ()
 
     def __post_init__(self) -> None:
@@ -105,6 +106,7 @@ class Spec:
             "random-stitch": to_plain(self.random_stitch),
             "mf-stitch": to_plain(self.mf_stitch),
             "mb-stitch": to_plain(self.mb_stitch),
+            "single-policy": to_plain(self.single_policy),
         }
         config = merged(settings[name], nested(overrides))
         return structure(METHODS[name].config, config, f"method {method}")
@@ -208,12 +210,26 @@ def _check_methods(spec: Spec, where: str) -> None:
             raise UsageError(f"{where}, methods: {same} and {method} are the same method")
         if isinstance(config, MFStitchConfig):
             check_start(config, spec.agent, f"{where}, {method}")
+        if isinstance(config, SinglePolicyConfig):
+            _check_demonstrated(spec, config, f"{where}, {method}")
         discrete = BENCHMARKS[spec.benchmark].actions.discrete
         if isinstance(config, MBStitchConfig) and config.planner == "cem" and discrete:
             raise UsageError(
                 f"{where}, {method}: cem plans continuous actions, {spec.benchmark} has discrete "
                 "ones; set planner to random-shooting"
             )
+
+
+def _check_demonstrated(spec: Spec, config: SinglePolicyConfig, where: str) -> None:
+    """Whether there can be demonstrations of the one task that a policy is to learn."""
+    if not KITS[spec.benchmark].long_horizon(spec.data):
+        raise UsageError(f"{where}: these data of {spec.benchmark} demonstrate no long task")
+    skills = config.task.split(">")
+    if not set(skills) <= set(spec.skill_names) or len(set(skills)) < len(skills):
+        raise UsageError(
+            f"{where}, task: {config.task!r} is no task; join skills by '>', each once, of "
+            f"{', '.join(spec.skill_names)}"
+        )
 
 
 PACKAGED = resources.files("orchestrator.specs")
@@ -228,55 +244,9 @@ def load_spec(name_or_file: str, scale: Scale = "paper") -> Spec:
 
     Raises UsageError for an unknown name, field, scale or value, listing what is valid.
     """
-    return spec_from_plain(*load_toml(name_or_file, scale, PACKAGED, "spec"))
-
-
-def toml_names(packaged: Traversable) -> list[str]:
-    """Names of the TOML files in a packaged folder, sorted."""
-    files = (entry.name for entry in packaged.iterdir())
-    return sorted(name.removesuffix(".toml") for name in files if name.endswith(".toml"))
-
-
-def load_toml(
-    name_or_file: str, scale: Scale, packaged: Traversable, what: str
-) -> tuple[Plain, str]:
-    """The content of a packaged file by name, or of any file, at a scale; and what to call it.
-
-    TOML holds values only, so a spec cannot execute anything. Raises UsageError, naming it as a
-    `what`, for an unknown name, a broken file and an unknown scale.
-    """
-    content, where = read_toml(name_or_file, packaged, what)
-    return at_scale(content, scale, where), where
-
-
-def read_toml(name_or_file: str, packaged: Traversable, what: str) -> tuple[Plain, str]:
-    """The content of a packaged file by name, or of any file, and what to call it."""
-    names = toml_names(packaged)
-    if name_or_file in names:
-        data = packaged.joinpath(f"{name_or_file}.toml").read_bytes()
-        where = f"packaged {what} {name_or_file}"
-    elif Path(name_or_file).is_file():
-        data, where = Path(name_or_file).read_bytes(), name_or_file
-    else:
-        raise UsageError(
-            f"no {what} {name_or_file!r}: neither a file nor one of {', '.join(names)}"
-        )
-    try:
-        return tomllib.loads(data.decode()), where
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise UsageError(f"{where}: not valid TOML: {error}") from error
-
-
-def at_scale(content: Plain, scale: Scale, where: str) -> Plain:
-    """A file's fields at one of its scales; UsageError lists those that there are."""
-    fields = {name: value for name, value in content.items() if name != "scales"}
-    scales = content.get("scales", {})
-    if not isinstance(scales, dict) or not all(isinstance(s, dict) for s in scales.values()):
-        raise UsageError(f"{where}, scales: expected a table of fields for each scale")
-    scales = {"paper": {}} | scales
-    if scale not in scales:
-        raise UsageError(f"{where}: no scale {scale!r}; it has {', '.join(scales)}")
-    return merged(fields, scales[scale]) | {"scale": scale}
+    content, where = read_toml(name_or_file, PACKAGED, "spec")
+    folder = Path(name_or_file).parent
+    return spec_from_plain(based_fields(content, scale, PACKAGED, folder, where), where)
 
 
 def spec_from_plain(content: Plain, where: str) -> Spec:

@@ -15,16 +15,14 @@ from orchestrator.spec import (
     Scale,
     Spec,
     TableSpec,
-    at_scale,
     check_names,
     check_rows,
     differences,
-    packaged_specs,
     plain_differences,
-    read_toml,
     spec_from_plain,
 )
 from orchestrator.structure import Plain, merged, structure, to_plain
+from orchestrator.tomls import based_fields, read_toml
 
 OWN_FIELDS = ("name", "title", "parts", "tables", "skill_labels")  # all others are the parts'
 NOT_OF_A_PART = ("name", "title", "scale", "tables")
@@ -128,8 +126,9 @@ def load_asked(name_or_file: str, scale: Scale = "paper") -> Spec | Suite:
     Raises UsageError for whatever is unknown or missing, listing what is valid.
     """
     content, where = read_toml(name_or_file, PACKAGED, "spec")
+    folder = Path(name_or_file).parent
     if "parts" not in content:
-        return spec_from_plain(at_scale(content, scale, where), where)
+        return spec_from_plain(based_fields(content, scale, PACKAGED, folder, where), where)
     if not isinstance(content["parts"], list):
         raise UsageError(f"{where}, parts: expected [[parts]], got {content['parts']!r}")
     if missing := [name for name in ("name", "title", "tables") if name not in content]:
@@ -138,7 +137,6 @@ def load_asked(name_or_file: str, scale: Scale = "paper") -> Spec | Suite:
         structure(PartFields, entry, f"{where}, parts[{i}]")
         for i, entry in enumerate(content["parts"])
     ]
-    folder = Path(name_or_file).parent
     parts = tuple(
         Part(entry.label, _part_spec(entry, content, scale, folder, where)) for entry in entries
     )
@@ -152,23 +150,12 @@ def _part_spec(entry: PartFields, content: Plain, scale: Scale, folder: Path, wh
     if foreign := [name for name in NOT_OF_A_PART if name in entry.settings]:
         raise UsageError(f"{where}, settings: {foreign[0]!r} is the suite's; set it there")
     shared = {name: value for name, value in content.items() if name not in OWN_FIELDS}
-    base: Plain = {}
-    if entry.base:
-        raw, base_where = read_toml(_beside(entry.base, folder), PACKAGED, "spec")
-        if "parts" in raw:
-            raise UsageError(f"{where}: its base {entry.base} is itself a suite; name a spec")
-        base = at_scale(raw, scale, base_where)
-        shared["scales"] = {scale: {}} | shared.get("scales", {})  # the base has the scale
-    fields = merged(merged(base, at_scale(shared, scale, where)), entry.settings)
+    shared["base"] = entry.base
+    fields = based_fields(shared, scale, PACKAGED, folder, where)
+    fields = merged(fields, entry.settings)
     fields |= {"name": f"{content['name']}-{entry.label}"}
     fields |= {"title": f"{content['title']}: {entry.label}"}
     return spec_from_plain(fields, where)
-
-
-def _beside(base: str, folder: Path) -> str:
-    """A packaged spec's name, or a file beside the suite's, with or without its ending."""
-    files = [folder / base, folder / f"{base}.toml"] if base not in packaged_specs() else []
-    return next((str(file) for file in files if file.is_file()), base)
 
 
 def with_specs(suite: Suite, specs: list[Spec]) -> Suite:

@@ -15,7 +15,7 @@ from orchestrator.builders.models import load_models
 from orchestrator.builders.parts import Inputs
 from orchestrator.jobs import BlockReport, BlockTask, BuildJob, PlayJob, Report
 from orchestrator.ledger import Outcome
-from orchestrator.methods import make_stitcher
+from orchestrator.methods import make_stitcher, method_block, method_of
 from orchestrator.store import Artifact
 from orchestrator.structure import structure
 from stitching.data.transitions import DataError
@@ -46,7 +46,7 @@ class BlockPlayer:
 
     def __init__(self) -> None:
         self._models: dict[tuple[str, str], Any] = {}
-        self._blocks: dict[str, EpisodeBlock] = {}
+        self._blocks: dict[tuple[str, str], EpisodeBlock] = {}
 
     def play(self, job: PlayJob, artifacts: Mapping[str, Artifact]) -> Report:
         """Every block of the job; one that fails does not touch the others. Artifacts by key."""
@@ -67,13 +67,13 @@ class BlockPlayer:
     ) -> Outcome:
         benchmark = BENCHMARKS[task.benchmark]
         models = {kind: self._model(task, kind, artifacts) for kind in task.artifacts}
-        agent = models["agent"]
+        agent = models[method_of(task.method).policy]
         stitcher = make_stitcher(task.method, task.stitcher, benchmark, agent, models)
         episodes, used, snapshots = survivors(task, parent)
         play = Play(
             task.root_seed, task.benchmark, task.seed, task.method, tuple(episodes), task.prefix
         )
-        block = self._blocks.setdefault(task.benchmark, benchmark.block())
+        block = self._block(task)
         begin(block, play, snapshots)
         config = structure(RolloutConfig, task.rollout, "rollout")
         segments = play_segment(
@@ -91,6 +91,12 @@ class BlockPlayer:
                 "snapshots": segments.snapshots[segments.success],
             }
         )
+
+    def _block(self, task: BlockTask) -> EpisodeBlock:
+        place = task.benchmark, method_of(task.method).policy
+        if place not in self._blocks:
+            self._blocks[place] = method_block(task.method, BENCHMARKS[task.benchmark])
+        return self._blocks[place]
 
     def _model(self, task: BlockTask, kind: str, artifacts: Mapping[str, Artifact]) -> Any:
         key = task.artifacts[kind]

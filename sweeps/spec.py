@@ -13,11 +13,10 @@ from orchestrator.spec import (
     Spec,
     TableSpec,
     load_spec,
-    load_toml,
     spec_from_plain,
-    toml_names,
 )
 from orchestrator.structure import Plain, merged, structure, to_plain
+from orchestrator.tomls import load_toml, toml_names
 from stitching.streams import stream
 from sweeps.space import Space, check_space, grid_points
 

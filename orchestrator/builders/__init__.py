@@ -2,16 +2,22 @@
 
 from orchestrator.builders.anatomy import ANATOMY_BUILDERS
 from orchestrator.builders.kitchen import KITCHEN_BUILDERS
+from orchestrator.builders.long_horizon import LONG_HORIZON_BUILDERS
 from orchestrator.builders.maze import MAZE_BUILDERS
 from orchestrator.builders.parts import PLANNERS, Builder
 from orchestrator.builders.robosuite import ROBOSUITE_BUILDERS
 from orchestrator.builders.training import TRAINING_BUILDERS
 
 BUILDERS: dict[str, Builder] = (
-    TRAINING_BUILDERS | MAZE_BUILDERS | KITCHEN_BUILDERS | ROBOSUITE_BUILDERS | ANATOMY_BUILDERS
+    TRAINING_BUILDERS
+    | MAZE_BUILDERS
+    | KITCHEN_BUILDERS
+    | LONG_HORIZON_BUILDERS
+    | ROBOSUITE_BUILDERS
+    | ANATOMY_BUILDERS
 )
 
-# What decides a block's outcome beside the models: Algorithm 1 and the planners,
-BLOCK_CODE = ("stitching.rollout", *PLANNERS)
+# What decides a block's outcome beside the models: Algorithm 1, the planners, what counts,
+BLOCK_CODE = ("stitching.rollout", "stitching.envs.first_times", *PLANNERS)
 # and how they are set up, without the method's code that these import for other purposes.
 BLOCK_SETUP = ("orchestrator.builders.models", "orchestrator.methods", "orchestrator.worker")

@@ -6,6 +6,7 @@ from typing import Any
 
 from orchestrator.builders.parts import Inputs
 from orchestrator.structure import Plain, structure
+from stitching.data.uncut import no_conditions
 from stitching.envs.protocol import Benchmark, conditions
 from stitching.models.agent import Agent
 from stitching.models.dynamics import Dynamics, DynamicsConfig
@@ -20,6 +21,9 @@ def load_models(benchmark: Benchmark, configs: Plain, artifacts: Inputs) -> dict
         elif kind == "mf-policy":
             # What the reading of its data has told it, one condition a pair of skills.
             models[kind] = Agent(artifact.arrays, artifact.arrays["conditions"], benchmark.actions)
+        elif kind == "single-policy":
+            unconditioned = no_conditions(len(benchmark.skills))
+            models[kind] = Agent(artifact.arrays, unconditioned, benchmark.actions)
         elif kind == "dynamics":
             config = structure(DynamicsConfig, configs[kind], kind)
             models[kind] = Dynamics(artifact.arrays, config)

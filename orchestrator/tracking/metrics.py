@@ -17,8 +17,12 @@ if TYPE_CHECKING:
 
 Curves = dict[str, list[tuple[int, float]]]
 
-EXTRA_ARTIFACT = {"mb-stitch": "dynamics", "mf-stitch": "mf-policy"}
-"""What a method uses beside the agent that all methods share."""
+ARTIFACTS = {
+    "mb-stitch": {"agent", "dynamics"},
+    "mf-stitch": {"agent", "mf-policy"},
+    "single-policy": {"single-policy"},
+}
+"""What a method is played with, where that is not just the skills' agent."""
 
 
 def reported(report: Path, table: str) -> dict[str, float]:
@@ -63,7 +67,8 @@ def seed_scores(episodes: pd.DataFrame, spec: RunSpec, entry: TableEntry) -> dic
 
 def learning_curves(method: str, seed: int, training: list[dict[str, Any]]) -> Curves:
     """Learning curves of the artifacts that this method uses under this seed."""
-    kinds = {"agent", *(kind for name, kind in EXTRA_ARTIFACT.items() if method.startswith(name))}
+    own = [used for name, used in ARTIFACTS.items() if method.startswith(name)]
+    kinds = set().union(*own) or {"agent"}
     variant = method.partition(VARIANT)[2]
     used = [
         entry

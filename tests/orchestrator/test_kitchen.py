@@ -7,6 +7,7 @@ from itertools import pairwise
 import pandas as pd
 import pytest
 
+from orchestrator.methods import SinglePolicyConfig
 from orchestrator.plan import Plan, make_plan
 from orchestrator.spec import Spec, load_spec
 from stitching.data.kitchen.segments import Order
@@ -16,7 +17,7 @@ from stitching.planning.cem import CEM
 from tests.orchestrator.tiny import Alone, Place
 
 ORDER: Order = ("microwave", "kettle", "bottom burner", "slide cabinet")
-METHODS = ("no-stitch", "random-stitch", "mf-stitch", "mb-stitch")
+METHODS = ("no-stitch", "random-stitch", "mf-stitch", "mb-stitch", "single-policy")
 
 pytestmark = pytest.mark.slow
 
@@ -31,6 +32,7 @@ def spec() -> Spec:
     )  # fmt: skip
     return replace(
         spec,
+        methods=METHODS,
         lengths=(),
         tasks=(">".join(ORDER[:3]), ">".join(ORDER), ">".join(ORDER[2:])),
         episodes=4,
@@ -40,6 +42,7 @@ def spec() -> Spec:
         dynamics=DynamicsConfig(updates=300, width=32, members=2, activation="elu"),
         random_stitch=replace(spec.random_stitch, limit=3),
         mf_stitch=replace(spec.mf_stitch, limit=3, training=replace(skills, updates=100)),
+        single_policy=SinglePolicyConfig(">".join(ORDER), episodes=12, training=skills),
         mb_stitch=replace(spec.mb_stitch, limit=3, cem=CEM(population=16, elites=4, iterations=10)),
     )
 

@@ -30,6 +30,7 @@ def test_every_kind_of_every_kit_can_be_made() -> None:
     for kit in KITS.values():
         kinds = {one.kind for one in kit.datasets(kit.data()).values()}
         kinds |= {one.kind for one in kit.illustrations.values()} | set(kit.extras.values())
+        kinds |= {kit.long_horizon(kit.data())} - {""}
         assert kinds <= BUILDERS.keys()
 
 

@@ -70,6 +70,27 @@ SOUND += "methods=['no-stitch']\n"
 MF = SOUND.replace("no-stitch", "mf-stitch") + "[mf_stitch]\n"
 
 
+def test_a_base_gives_what_a_file_leaves_open(tmp_path: Path) -> None:
+    (tmp_path / "sound.toml").write_text(SOUND + "[agent]\nwidth = 9\n[scales.smoke]\nseeds = 1")
+    (tmp_path / "mine.toml").write_text("base='sound'\nname='y'\n[agent]\nmembers = 2")
+    base, mine = (load_spec(str(tmp_path / f"{name}.toml"), "smoke") for name in ("sound", "mine"))
+    assert mine == replace(base, name="y", agent=replace(base.agent, members=2))
+    assert (mine.seeds, mine.agent.width) == (1, 9)
+
+
+def test_a_base_must_be_another_spec(tmp_path: Path) -> None:
+    (tmp_path / "ours.toml").write_text("base='mine'")
+    for base, complaint in {
+        "table3": "its base table3 is itself a suite",
+        "mine": "its base mine is based on it",
+        "ours": "its base mine is based on it",
+        "gone": "no spec 'gone'",
+    }.items():
+        (tmp_path / "mine.toml").write_text(f"base='{base}'")
+        with pytest.raises(UsageError, match=complaint):
+            load_spec(str(tmp_path / "mine.toml"))
+
+
 def test_the_spec_below_is_sound(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text(SOUND)
     assert load_spec(str(tmp_path / "mine.toml")).all_tasks == [("g0", "g1")]

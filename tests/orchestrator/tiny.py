@@ -11,7 +11,14 @@ from orchestrator.builders.models import load_models
 from orchestrator.executors.serial import SerialExecutor
 from orchestrator.jobs import BuildJob, Job
 from orchestrator.ledger import Ledger, Outcome
-from orchestrator.methods import first_method, make_stitcher, method_name
+from orchestrator.methods import (
+    first_method,
+    make_stitcher,
+    method_block,
+    method_name,
+    method_of,
+    method_rollout,
+)
 from orchestrator.plan import Node, Plan
 from orchestrator.progress import Silent
 from orchestrator.reproduce import Settings, reproduce
@@ -147,12 +154,13 @@ class Alone:
         artifacts = {kind: self.place.store.read(kind, key) for kind, key in task.artifacts.items()}
         models = load_models(benchmark, task.configs, artifacts)
         settings = to_plain(spec.method_config(self.method))
+        agent = models[method_of(self.method).policy]
         return play_from_start(
-            benchmark.block(),
-            models["agent"],
-            make_stitcher(self.method, settings, benchmark, models["agent"], models),
+            method_block(self.method, benchmark),
+            agent,
+            make_stitcher(self.method, settings, benchmark, agent, models),
             benchmark,
-            spec.rollout,
+            method_rollout(self.method, spec.rollout),
             Play(
                 spec.root_seed,
                 spec.benchmark,
