@@ -1,5 +1,6 @@
 """A small maze with briefly trained models for the tests of playing; one thread, as in workers."""
 
+import numpy as np
 import pytest
 import torch
 from hypothesis import settings
@@ -8,6 +9,7 @@ from stitching.data.experience import skill_experience
 from stitching.data.maze import MazeDataConfig, exploration, skill_demonstrations
 from stitching.data.mixtures import mixed_experience, skill_pairs
 from stitching.data.transitions import Transitions, concatenate
+from stitching.data.uncut import no_conditions, uncut_experience
 from stitching.envs.maze import Maze
 from stitching.envs.protocol import conditions
 from stitching.models.agent import Agent
@@ -53,6 +55,15 @@ def mf_policy(maze: Maze, demonstrations: Transitions) -> Agent:
     experience = mixed_experience(demonstrations, conditions(maze), "halves")
     trained = train_iql(experience, maze.actions, TRAINING, "mf-policy")
     return Agent(trained.weights, experience.conditions, maze.actions)
+
+
+@pytest.fixture(scope="session")
+def unconditioned(maze: Maze, demonstrations: Transitions) -> Agent:
+    """One policy of all demonstrations: it goes to any of the goals."""
+    rewards = np.zeros(len(demonstrations), dtype=np.float32)
+    rewards[demonstrations.episode_ends - 1] = demonstrations.episode_successes
+    trained = train_iql(uncut_experience(demonstrations, rewards), maze.actions, TRAINING, "one")
+    return Agent(trained.weights, no_conditions(len(maze.skills)), maze.actions)
 
 
 @pytest.fixture(scope="session")
