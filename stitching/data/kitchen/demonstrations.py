@@ -7,13 +7,13 @@ demonstrations of four skills in a row, so that is what is made here, for all se
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
-from stitching.data.kitchen.arm import Arm
-from stitching.data.kitchen.programs import PROGRAMS, Program, perform, style
+from stitching.data.kitchen.arm import GRIP_OPEN, HOME, Arm
+from stitching.data.kitchen.programs import PROGRAMS, Program, Style, perform, relocate, style
 from stitching.data.kitchen.segments import Episode, Order, Segment, as_transitions, cut
 from stitching.data.transitions import Transitions
 from stitching.envs.kitchen import JOINTS, KITCHEN, SKILLS, KitchenBlock
@@ -50,9 +50,24 @@ class KitchenDataConfig:
     episodes: int = 24  # demonstrations an order
     held_out: int = 8  # more of each order, to judge models by
     quality: float = 0.9  # of the hand: from 1, a steady expert, down to 0
+    qualities: dict[str, float] = field(default_factory=dict)  # skill → another quality for it
+    wait: int = 0  # steps, at most, that a demonstration stands still at first; people do for about 8
+    elsewhere: float = 0.0  # share of later skills that begin at a free pose, not where one ended
     skill_steps: int = 160  # after which a skill counts as missed and the demonstration ends
     return_home: bool = False  # to the start posture before another skill; people do not
     keep_failures: bool = False  # keep the segment of a missed skill, as one without success
+
+    def __post_init__(self) -> None:
+        unknown = sorted(self.qualities.keys() - set(SKILLS))
+        if unknown:
+            raise ValueError(f"qualities: no skill {unknown[0]!r}; there are {', '.join(SKILLS)}")
+        for name, share in {"elsewhere": self.elsewhere, **self.qualities}.items():
+            if not 0 <= share <= 1:
+                raise ValueError(f"{name}: must lie in [0, 1]")
+
+    def style(self, skill: str) -> Style:
+        """How a demonstrator's hand varies in a skill."""
+        return style(self.qualities.get(skill, self.quality))
 
 
 class Demonstrator:
@@ -60,11 +75,14 @@ class Demonstrator:
 
     def __init__(self, order: Order, config: KitchenDataConfig, rng: np.random.Generator) -> None:
         self._todo, self._config, self._rng = list(order), config, rng
-        self._style = style(config.quality)
+        self._style = config.style(order[0])
         self._done = np.zeros(len(SKILLS), dtype=bool)
         self._last: Program | None = None
         self._moves: Iterator[np.ndarray] | None = None
+        self._relocation: Iterator[np.ndarray] = iter(())
+        self._waiting = int(rng.integers(config.wait // 2, config.wait + 1)) if config.wait else 0
         self._steps = 0
+        self.relocating = False  # whether the last action belongs to no skill
 
     def act(self, arm: Arm, achieved: np.ndarray) -> np.ndarray | None:
         """Next action (9,) for what `arm` sees and the goals (7,) that hold; None at the end."""
@@ -77,18 +95,28 @@ class Demonstrator:
         if not self._todo or self._steps == self._config.skill_steps:
             return None
         if self._moves is None:
-            program = PROGRAMS[self._todo[0]]
+            self._style = self._config.style(self._todo[0])
+            if self._last is not None and self._rng.random() < self._config.elsewhere:
+                self._relocation = relocate(arm, self._last, self._rng)
+                self._last = None
             self._moves = perform(
-                program,
+                PROGRAMS[self._todo[0]],
                 arm,
                 self._style,
                 self._rng,
                 last=self._last,
                 return_home=self._config.return_home,
             )
-        self._steps += 1
+        action = next(self._relocation, None)
+        self.relocating = action is not None
+        if self._waiting:
+            self._waiting -= 1
+            action = arm.bend(np.zeros_like(HOME), GRIP_OPEN)
+        elif action is None:
+            action = next(self._moves)
+            self._steps += 1
         noise = self._style.noise * self._rng.standard_normal(JOINTS)
-        return np.clip(next(self._moves) + noise, -1, 1).astype(np.float32)
+        return np.clip(action + noise, -1, 1).astype(np.float32)
 
 
 def demonstrate(block: KitchenBlock, hands: Sequence[Demonstrator]) -> list[Episode]:
@@ -101,6 +129,7 @@ def demonstrate(block: KitchenBlock, hands: Sequence[Demonstrator]) -> list[Epis
     done = [[row] for row in _achieved(block, rows)]
     states = [[row] for row in block.snapshot(rows)]
     acted: list[list[np.ndarray]] = [[] for _ in hands]
+    relocating: list[list[bool]] = [[] for _ in hands]
     while len(rows):
         moves = {}
         for row in rows.tolist():
@@ -122,14 +151,19 @@ def demonstrate(block: KitchenBlock, hands: Sequence[Demonstrator]) -> list[Epis
         )
         for row, observation, achieved, state in after:
             acted[row].append(moves[row])
+            relocating[row].append(hands[row].relocating)
             seen[row].append(observation)
             done[row].append(achieved)
             states[row].append(state)
     return [
         Episode(
-            np.array(o), np.array(a, dtype=np.float32).reshape(-1, JOINTS), np.array(d), np.array(s)
+            np.array(o),
+            np.array(a, dtype=np.float32).reshape(-1, JOINTS),
+            np.array(d),
+            np.array(s),
+            np.array(r, dtype=bool),
         )
-        for o, a, d, s in zip(seen, acted, done, states, strict=True)
+        for o, a, d, s, r in zip(seen, acted, done, states, relocating, strict=True)
     ]
 
 

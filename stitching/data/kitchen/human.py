@@ -84,4 +84,5 @@ def as_episode(observations: np.ndarray, actions: np.ndarray) -> Episode:
         actions=np.clip(actions, -1, 1).astype(np.float32),  # as the environment does
         achieved=np.stack(distances, axis=1) < GOAL_RADIUS,
         snapshots=np.empty((len(observations), 0)),
+        relocating=np.zeros(len(actions), dtype=bool),
     )

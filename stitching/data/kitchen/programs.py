@@ -92,6 +92,10 @@ PROGRAMS: dict[str, Program] = {
 OPENING, LEAVING, HOMING = 4, 8, 30  # steps at most for each part of it
 LEAVE_SPEED = 0.09  # m a step
 CLEAR = 0.03  # m from where the hand wanted to go: far enough away
+# On taking the arm elsewhere: where the hand may be then, in the world.
+FREE = np.array([[-0.65, 0.25, 1.8], [0.0, 0.5, 2.5]])  # m, lower and upper corner
+FREE_TURN = 0.3  # rad, at most, of yaw, pitch and roll
+RELOCATING = 40  # steps at most
 HOMED = 0.3  # rad of every joint from the start posture: close enough to set out from
 
 
@@ -163,6 +167,17 @@ def _leave(arm: Arm, program: Program, pace: float) -> Iterator[np.ndarray]:
         if np.linalg.norm(there - arm.position) < CLEAR:
             break
         yield arm.reach(there, turn, pace * LEAVE_SPEED, GRIP_OPEN)
+
+
+def relocate(arm: Arm, last: Program, rng: np.random.Generator) -> Iterator[np.ndarray]:
+    """Clean actions (9,) that leave a skill for a random free pose in front of the objects."""
+    yield from _leave(arm, last, 1.0)
+    place = rng.uniform(FREE[0], FREE[1])
+    turn = hand_turn(*rng.uniform(-FREE_TURN, FREE_TURN, 3))
+    for _ in range(RELOCATING):
+        if np.linalg.norm(place - arm.position) < CLEAR:
+            break
+        yield arm.reach(place, turn, LEAVE_SPEED, GRIP_OPEN)
 
 
 def _return_home(arm: Arm) -> Iterator[np.ndarray]:

@@ -22,6 +22,7 @@ class Episode:
     actions: np.ndarray  # (T, 9) float32
     achieved: np.ndarray  # (T + 1, 7) bool: which goals hold
     snapshots: np.ndarray  # (T + 1, snapshot) float64; no columns where nobody simulated it
+    relocating: np.ndarray  # (T,) bool: steps that took the arm elsewhere, and are of no skill
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,8 @@ class Segment:
 def cut(episode: Episode, order: Order = ()) -> list[Segment]:
     """The skills of an episode, each from the end of the one before to its own first achievement.
 
-    What an episode began with, or achieved in the same step as another skill, has no segment. Where
+    Steps that took the arm elsewhere are of no segment: a skill begins where they ended. What an
+    episode began with, or achieved in the same step as another skill, has no segment. Where
     an order was asked for, an accident ends the demonstration: nothing is kept from the first skill
     on that came out of turn. If there was none, the steps after the last achievement are a segment
     without success, of the skill that was due.
@@ -54,14 +56,22 @@ def cut(episode: Episode, order: Order = ()) -> list[Segment]:
         kept = len(list(pairs))
     else:
         kept = len(shown)
-    segments, start = [], 0
+    segments, end = [], 0
     for skill in shown[:kept]:
-        if when[skill] > start:
-            segments.append(Segment(episode, start, int(when[skill]), skill, True))
-            start = int(when[skill])
-    if kept == len(shown) < len(due) and start < len(episode.actions):
-        segments.append(Segment(episode, start, len(episode.actions), due[kept], False))
+        start, end = _begins(episode, end, int(when[skill])), int(when[skill])
+        if start < end:
+            segments.append(Segment(episode, start, end, skill, True))
+    last = len(episode.actions)
+    start = _begins(episode, end, last)
+    if kept == len(shown) < len(due) and start < last:
+        segments.append(Segment(episode, start, last, due[kept], False))
     return segments
+
+
+def _begins(episode: Episode, start: int, end: int) -> int:
+    """The first step from start on that follows every relocation before end."""
+    moved = np.flatnonzero(episode.relocating[start:end])
+    return start + int(moved[-1]) + 1 if len(moved) else start
 
 
 def shown_orders(demonstrations: Iterable[Sequence[Segment]]) -> list[Order]:

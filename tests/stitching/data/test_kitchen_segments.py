@@ -30,7 +30,13 @@ def episode(steps: int, **achieved: tuple[int, ...]) -> Episode:
     for word, states in achieved.items():
         skill = next(i for i, name in enumerate(SKILLS) if name.startswith(word))
         holds[list(states), skill] = True
-    return Episode(np.zeros((steps + 1, 59)), np.zeros((steps, 9)), holds, np.zeros((steps + 1, 0)))
+    return Episode(
+        np.zeros((steps + 1, 59)),
+        np.zeros((steps, 9)),
+        holds,
+        np.zeros((steps + 1, 0)),
+        np.zeros(steps, dtype=bool),
+    )
 
 
 def cuts(shown: Episode, order: tuple[str, ...] = ()) -> list[tuple[str, int, int, bool]]:
