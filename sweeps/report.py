@@ -68,9 +68,8 @@ def field_importances(study: SweepStudy) -> dict[str, float]:
     whole = {trial.values[0] for trial in study.finished}
     if len(study.sweep.space) < 2 or len(whole) < 2:
         return {}
-    sign = (
-        -1 if METRICS[study.sweep.objectives[0]].maximised else 1
-    )  # it asks what makes the target low
+    # The importances are asked for what makes the target low.
+    sign = -1 if METRICS[study.sweep.objectives[0]].maximised else 1
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return get_param_importances(study.study, target=lambda trial: sign * trial.values[0])

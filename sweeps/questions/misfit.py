@@ -11,7 +11,7 @@ from itertools import permutations
 
 import pandas as pd
 
-from analysis.implied import bounds, skills
+from analysis.implied import MEAN, bounds, skills
 from analysis.misfit import PROFILED, misfit
 from analysis.paper import paper_scores
 from analysis.profile import MARGIN, profile
@@ -44,7 +44,8 @@ class Profiled:
         """Misfit and its parts; the rates themselves, by method, kind and skill."""
         parts = misfit(self.profiles[PROFILED], self.scores)
         two = {method: score for (method, length), score in self.scores.items() if length == 2}
-        by_skill = self.profiles[PROFILED].query("skill != @MEAN")
+        own = self.profiles[PROFILED]
+        by_skill = own[own["skill"] != MEAN]
         return {
             "misfit": parts.total,
             "first": parts.first,
