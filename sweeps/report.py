@@ -105,7 +105,7 @@ def confirm_lines(sweep: SweepSpec, best: Plain, confirmed: Plain) -> Iterator[s
         yield ""
         return
     spec, seeds = confirm_spec(sweep)
-    where = "held-out tasks" if confirmed["held_out"] else "the search's own tasks"
+    where = "held-out tasks" if confirmed["held_out"] else "tasks of the search"
     numbers = ", ".join(map(str, seeds))
     yield (
         f"Judged again on {len(spec.tasks)} {where} by new seeds ({numbers}; root seed "
