@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -35,6 +35,7 @@ class Played:
 
     segments: pd.DataFrame
     episodes: pd.DataFrame
+    run: RunSpec  # what was asked, of these seeds alone
 
 
 @dataclass
@@ -120,9 +121,9 @@ class Arena:
         finally:
             self.progress = loud
 
-    def prepare(self, spec: Spec) -> None:
-        """Train what a spec needs and the store does not have."""
-        self._build(make_plan(spec))
+    def prepare(self, specs: Iterable[Spec], seeds: Iterable[int] | None = None) -> None:
+        """Train what some specs need and the store does not have, side by side."""
+        self._build([only_seeds(make_plan(spec), _seeds(spec, seeds)) for spec in specs])
 
     def play(self, spec: Spec, seeds: Iterable[int] | None = None) -> Played:
         """Train and simulate what is missing; all seeds of the spec, or some.
@@ -130,10 +131,9 @@ class Arena:
         Raises IncompleteError when blocks had to be given up: a result on what is left would be
         another one. The same command tries again.
         """
-        plan = make_plan(spec)
-        wanted = tuple(range(spec.seeds) if seeds is None else seeds)
-        plan = only_seeds(plan, wanted)
-        self._build(plan)
+        wanted = _seeds(spec, seeds)
+        plan = only_seeds(make_plan(spec), wanted)
+        self._build([plan])
         Evaluation(plan, self.store, self.ledger, self.shared, self.tally, self.progress).run()
         if given_up := quarantine(plan, self.ledger):
             raise IncompleteError(
@@ -142,20 +142,32 @@ class Arena:
             )
         segments = segments_frame(plan, self.ledger)
         run = replace(RunSpec.from_dict(describe(spec)), seeds=wanted)
-        return Played(segments, episodes_from_segments(segments, run))
+        return Played(segments, episodes_from_segments(segments, run), run)
 
-    def _build(self, plan: Plan) -> None:
-        unseen = {k: r for k, r in plan.recipes.items() if k in plan.needed - self._whole}
-        unseen_plan = replace(plan, recipes=unseen)
-        self._whole |= verified_artifacts(unseen_plan, self.store, self.ledger, self.progress)
-        if plan.needed - self._whole:
+    def _build(self, plans: Sequence[Plan]) -> None:
+        if not plans:
+            return
+        needed = {key for plan in plans for key in plan.needed}
+        recipes = {key: recipe for plan in plans for key, recipe in plan.recipes.items()}
+        # Whoever builds and verifies looks at a plan's recipes alone.
+        unseen = replace(
+            plans[0], recipes={k: r for k, r in recipes.items() if k in needed - self._whole}
+        )
+        self._whole |= verified_artifacts(unseen, self.store, self.ledger, self.progress)
+        if needed - self._whole:
+            plan = replace(plans[0], recipes=recipes)
             builds = Builds(plan, self.store, self.ledger, self.tally, self.progress)
-            builds.run(plan.needed, self._whole & set(plan.recipes))
-            self._whole |= plan.needed
+            builds.run(needed, self._whole & set(recipes))
+            self._whole |= needed
 
     def close(self) -> None:
         self.tally.close()
         self.shared.close()
+
+
+def _seeds(spec: Spec, seeds: Iterable[int] | None) -> tuple[int, ...]:
+    """All of a spec's, or those that are wanted."""
+    return tuple(range(spec.seeds) if seeds is None else seeds)
 
 
 def only_seeds(plan: Plan, seeds: tuple[int, ...]) -> Plan:

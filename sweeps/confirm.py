@@ -7,7 +7,6 @@ from dataclasses import replace
 from orchestrator.spec import Spec
 from orchestrator.structure import Plain
 from sweeps.arena import Arena
-from sweeps.scoring import play_candidates
 from sweeps.space import describe
 from sweeps.spec import SweepSpec, base_spec, split_tasks
 from sweeps.study import RESULT, SweepStudy
@@ -36,7 +35,7 @@ def confirm_spec(sweep: SweepSpec) -> tuple[Spec, tuple[int, ...]]:
 
 
 def confirm(sweep: SweepSpec, study: SweepStudy, arena: Arena) -> Plain:
-    """The best trials beside No-Stitch and the base's own setting, each gain with its interval.
+    """The best trials beside the base's own setting, measured as in the search.
 
     The winner is the search's best. The others are there to compare it with: a winner chosen by
     these episodes could not be judged by them.
@@ -46,22 +45,16 @@ def confirm(sweep: SweepSpec, study: SweepStudy, arena: Arena) -> Plain:
         return {}
     spec, seeds = confirm_spec(sweep)
     candidates = [study.fields(trial) for trial in best]
-    *showings, base = play_candidates(arena, spec, [*candidates, {}], seeds)
+    *showings, base = sweep.question.play(arena, spec, [*candidates, {}], seeds)
     rows = []
     for trial, showing in zip(best, showings, strict=True):
         names = (sweep.name, "confirm", str(trial.number))
-        over_base = showing.gain_over(base.episodes, *names, "over the base")
-        found, again = trial.user_attrs[RESULT], showing.result(*names)
+        again = sweep.question.again(trial.user_attrs[RESULT], showing, base, *names)
         rows.append(
             {
                 "trial": trial.number,
                 "fields": study.fields(trial),
                 "setting": describe(study.fields(trial)),
-                "search_gain": found["gain"],
-                "survives": again["gain"] / found["gain"] if found["gain"] > 0 else None,
-                "over_base": over_base.difference,
-                "over_base_low": over_base.low,
-                "over_base_high": over_base.high,
             }
             | again
         )

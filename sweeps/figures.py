@@ -15,15 +15,12 @@ from matplotlib.figure import Figure
 from analysis.figures.style import COLOURS, FAINT, INK, house_style, new_figure, save
 from analysis.paper import paper_scores
 from orchestrator.structure import Plain
+from sweeps.questions import METRICS
+from sweeps.scoring import pareto_front
 from sweeps.spec import SweepSpec
 
 ALPHA, BETA = "mb_stitch.alpha", "mb_stitch.beta"
 MOST_PANELS = 12  # tasks that get a heat map of their own
-LABELS = {
-    "gain": "gain over No-Stitch",
-    "score": "score",
-    "imagined": "model steps a stitch, at most",
-}
 
 
 def draw_figures(
@@ -31,7 +28,7 @@ def draw_figures(
 ) -> list[str]:
     """Draw what there is something to show of; returns the names of the files, without suffix."""
     drawn: dict[str, Callable[[], Figure | None]] = {
-        "history": lambda: history(trials),
+        "history": lambda: history(sweep, trials),
         "importances": lambda: importance_bars(importances),
         "slices": lambda: slices(sweep, trials),
         "pareto": lambda: pareto(sweep, trials),
@@ -48,32 +45,39 @@ def draw_figures(
     return names
 
 
-def history(trials: Sequence[Plain]) -> Figure:
-    """Every trial's gain with its interval, and the best so far among those played in full."""
+def history(sweep: SweepSpec, trials: Sequence[Plain]) -> Figure:
+    """Every trial's gain (or misfit), and the best so far among those played in full."""
+    main = sweep.question.main
     figure = new_figure(6.5, 3.2)
     axes = figure.subplots()
     for pruned, colour, label in ((False, COLOURS[0], "trial"), (True, FAINT, "given up")):
         some = [trial for trial in trials if trial["pruned"] == pruned]
         if some:
-            gains = np.array([trial["gain"] for trial in some])
-            ends = np.array([[t["gain_low"], t["gain_high"]] for t in some]).T
-            spread = np.abs(ends - gains)
             axes.errorbar(
-                [t["trial"] for t in some], gains, spread, fmt="o", ms=4, lw=0.8,
-                color=colour, label=label,
+                [t["trial"] for t in some], [t[main] for t in some], _spread(some, main),
+                fmt="o", ms=4, lw=0.8, color=colour, label=label,
             )  # fmt: skip
     whole = [trial for trial in trials if trial["feasible"] and not trial["pruned"]]
     if whole:
-        best = np.maximum.accumulate([trial["gain"] for trial in whole])
+        better = np.maximum if METRICS[main].maximised else np.minimum
+        best = better.accumulate([trial[main] for trial in whole])
         axes.step([t["trial"] for t in whole], best, where="post", color=COLOURS[3], label="best")
     axes.axhline(0, color=INK, lw=0.6)
-    axes.set(xlabel="trial", ylabel=LABELS["gain"])
+    axes.set(xlabel="trial", ylabel=METRICS[main].label)
     axes.legend()
     return figure
 
 
+def _spread(trials: Sequence[Plain], metric: str) -> np.ndarray | None:
+    """(2, trials) from a metric down and up to the ends of its interval, if it has one."""
+    if f"{metric}_low" not in trials[0]:
+        return None
+    ends = np.array([[trial[f"{metric}_{end}"] for trial in trials] for end in ("low", "high")])
+    return np.abs(ends - [trial[metric] for trial in trials])
+
+
 def importance_bars(importances: dict[str, float]) -> Figure | None:
-    """How much of the gain's variation among good trials each field explains (PED-ANOVA)."""
+    """How much of the objective's variation among good trials each field explains (PED-ANOVA)."""
     if not importances:
         return None
     figure = new_figure(5.5, 0.8 + 0.3 * len(importances))
@@ -85,7 +89,7 @@ def importance_bars(importances: dict[str, float]) -> Figure | None:
 
 
 def slices(sweep: SweepSpec, trials: Sequence[Plain]) -> Figure:
-    """Gain against each searched field, later trials darker."""
+    """Gain (or misfit) against each searched field, later trials darker."""
     paths = list(sweep.space)
     columns = min(3, len(paths))
     rows = -(-len(paths) // columns)
@@ -93,7 +97,7 @@ def slices(sweep: SweepSpec, trials: Sequence[Plain]) -> Figure:
     grid = figure.subplots(rows, columns, squeeze=False, sharey=True)
     for axes in grid.flat[len(paths) :]:
         axes.remove()
-    gains = [trial["gain"] for trial in trials]
+    numbers = [trial[sweep.question.main] for trial in trials]
     for axes, path in zip(grid.flat, paths, strict=False):
         dimension = sweep.space[path]
         values = [trial["fields"][path] for trial in trials]
@@ -102,11 +106,11 @@ def slices(sweep: SweepSpec, trials: Sequence[Plain]) -> Figure:
             axes.set_xticks(range(len(dimension.choices)), list(map(str, dimension.choices)))
         elif dimension.log:
             axes.set_xscale("log")
-        axes.scatter(values, gains, c=range(len(trials)), cmap="Blues", ec=INK, lw=0.4, s=18)
+        axes.scatter(values, numbers, c=range(len(trials)), cmap="Blues", ec=INK, lw=0.4, s=18)
         axes.axhline(0, color=INK, lw=0.6)
         axes.set_xlabel(_label(path))
     for axes in grid[:, 0]:
-        axes.set_ylabel("gain")
+        axes.set_ylabel(sweep.question.main)
     return figure
 
 
@@ -124,22 +128,8 @@ def pareto(sweep: SweepSpec, trials: Sequence[Plain]) -> Figure | None:
     )
     for trial in front:
         axes.annotate(str(trial["trial"]), (trial["imagined"], trial["gain"]), fontsize=7)
-    axes.set(xlabel=LABELS["imagined"], ylabel=LABELS["gain"])
+    axes.set(xlabel=METRICS["imagined"].label, ylabel=METRICS["gain"].label)
     return figure
-
-
-def pareto_front(trials: Sequence[Plain]) -> list[Plain]:
-    """Trials that no other one beats in gain without planning more."""
-    return [
-        one
-        for one in trials
-        if not any(
-            other["gain"] >= one["gain"]
-            and other["imagined"] <= one["imagined"]
-            and (other["gain"], -other["imagined"]) != (one["gain"], -one["imagined"])
-            for other in trials
-        )
-    ]
 
 
 def alpha_beta(sweep: SweepSpec, trials: Sequence[Plain]) -> Figure | None:
@@ -157,8 +147,10 @@ def alpha_beta(sweep: SweepSpec, trials: Sequence[Plain]) -> Figure | None:
 
 def alpha_beta_tasks(sweep: SweepSpec, trials: Sequence[Plain]) -> Figure | None:
     """One heat map a task, where a grid has few enough of them; the paper's below ours."""
+    if not _is_grid(sweep):
+        return None
     tasks = list(trials[0]["tasks"])
-    if not _is_grid(sweep) or not 1 < len(tasks) <= MOST_PANELS:
+    if not 1 < len(tasks) <= MOST_PANELS:
         return None
     panels = {_row(task): [trial["tasks"][task] for trial in trials] for task in tasks}
     panels |= paper_gains(sweep, trials, list(panels))

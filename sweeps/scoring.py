@@ -41,7 +41,7 @@ class Showing:
         return paired_gain(self.episodes, other, generator("sweep", *names), other_tasks=True)
 
     def result(self, *names: str) -> Plain:
-        """The metrics of a trial (see `sweeps.spec.MAXIMISED`)."""
+        """The metrics of a trial (see `sweeps.questions.gain`)."""
         gain = self.gain_over(self.baseline, *names)
         return {
             "gain": gain.difference,
@@ -102,13 +102,29 @@ def play_candidates(
     """All candidates on the base's tasks and episodes; what they share is played once."""
     showings: dict[int, Showing] = {}
     baseline = pd.DataFrame()
-    for one in group(candidates, base, f"sweep over {base.name}"):
+    groups = group(candidates, base, f"sweep over {base.name}")
+    arena.prepare([one.spec for one in groups], seeds)
+    for one in groups:
         played = arena.play(one.spec, seeds)
         if NO_STITCH in one.spec.methods:
             baseline = _of(played.episodes, NO_STITCH)
         for place, method in one.methods.items():
             showings[place] = _showing(played, one.spec, method, baseline)
     return [showings[place] for place in range(len(candidates))]
+
+
+def pareto_front(trials: Sequence[Plain]) -> list[Plain]:
+    """Trials that no other one beats in gain without planning more."""
+    return [
+        one
+        for one in trials
+        if not any(
+            other["gain"] >= one["gain"]
+            and other["imagined"] <= one["imagined"]
+            and (other["gain"], -other["imagined"]) != (one["gain"], -one["imagined"])
+            for other in trials
+        )
+    ]
 
 
 def _showing(played: Played, spec: Spec, method: str, baseline: pd.DataFrame) -> Showing:

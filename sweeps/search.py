@@ -15,7 +15,7 @@ from orchestrator.spec import Spec
 from orchestrator.structure import Plain
 from stitching.streams import stream
 from sweeps.arena import Arena
-from sweeps.scoring import Showing, play_candidates
+from sweeps.questions.question import Showing
 from sweeps.space import describe
 from sweeps.spec import SweepSpec, base_spec, split_tasks
 from sweeps.study import RESULT, SweepStudy, expected, wilcoxon
@@ -84,7 +84,8 @@ def _play_batch(
     going_on = list(batch)
     shown: dict[int, tuple[Showing, int]] = {}  # number → what it did, in how many rounds
     for done, part in enumerate(parts, start=1):
-        showings = play_candidates(arena, part, [study.fields(trial) for trial in going_on])
+        fields = [study.fields(trial) for trial in going_on]
+        showings = sweep.question.play(arena, part, fields, None)
         shown |= {t.number: (s, done) for t, s in zip(going_on, showings, strict=True)}
         if len(parts) == 1:
             break
@@ -142,7 +143,6 @@ def trial_line(study: SweepStudy, trial: FrozenTrial) -> str:
     note = " · best so far" if best and best[0].number == trial.number else ""
     note = f" · given up after round {result['rounds']}" if result["pruned"] else note
     return (
-        f"trial {trial.number}: gain {result['gain']:+.3f} "
-        f"[{result['gain_low']:+.3f}, {result['gain_high']:+.3f}], "
+        f"trial {trial.number}: {study.sweep.question.headline(result)}, "
         f"{describe(study.fields(trial))}{note}"
     )

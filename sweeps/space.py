@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -20,8 +21,6 @@ from orchestrator.structure import Plain, merged, nested, to_plain
 Value = int | float | bool | str
 Fields = dict[str, Value]  # path in a run spec, as "mb_stitch.cem.population", → value
 
-SEARCHED = ("mb_stitch", "agent", "dynamics", "data", "rollout")
-"""The parts of a spec that a trial may change; the rest says which episodes are compared."""
 MOST_CORNERS = 512
 
 
@@ -96,17 +95,18 @@ class Dimension:
 Space = dict[str, Dimension]
 
 
-def check_space(space: Space, spec: Spec, where: str) -> None:
+def check_space(space: Space, spec: Spec, parts: Sequence[str], where: str) -> None:
     """Build the spec at the corners of the space, so that no trial can be refused later.
 
-    UsageError names the field and what is valid.
+    parts of a spec are what a trial may change: others say which episodes are compared, or change
+    nothing that is played. UsageError names the field and what is valid.
     """
     if not space:
         raise UsageError(f"{where}: nothing to search; as space.'mb_stitch.alpha' = {{ … }}")
     for path, dimension in space.items():
-        if path.split(".")[0] not in SEARCHED:
+        if path.split(".")[0] not in parts:
             raise UsageError(
-                f"{where}: {path!r} cannot be searched; begin with one of {', '.join(SEARCHED)}"
+                f"{where}: {path!r} cannot be searched; begin with one of {', '.join(parts)}"
             )
         dimension.check(f"{where}, {path}")
     lowest = {path: dimension.ends[0] for path, dimension in space.items()}
@@ -130,12 +130,13 @@ def replaced(spec: Spec, fields: Fields, where: str) -> Spec:
     return spec_from_plain(merged(to_plain(spec), nested(dict(fields))), where)
 
 
-def current(spec: Spec, path: str) -> Value:
-    """The spec's own value of a field."""
-    value: Plain = to_plain(spec)
-    for name in path.split("."):
-        value = value[name]
-    return value  # type: ignore[return-value]
+def current(spec: Spec, path: str) -> Value | None:
+    """The spec's own value of a field; None of an entry that a table of it has not."""
+    *above, name = path.split(".")
+    table: Plain = to_plain(spec)
+    for part in above:
+        table = table[part]
+    return table.get(name)
 
 
 def describe(fields: Fields) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from orchestrator.errors import UsageError
 from orchestrator.spec import (
@@ -18,14 +18,9 @@ from orchestrator.spec import (
 from orchestrator.structure import Plain, merged, structure, to_plain
 from orchestrator.tomls import load_toml, toml_names
 from stitching.streams import stream
+from sweeps.questions import METRICS, question_of
+from sweeps.questions.question import Question
 from sweeps.space import Space, check_space, grid_points
-
-Metric = Literal["gain", "score", "imagined"]
-MAXIMISED: dict[Metric, bool] = {
-    "gain": True,  # mean score over No-Stitch's, paired by seed, task and episode
-    "score": True,  # accomplished share of a task's skills
-    "imagined": False,  # model steps that planning one stitch takes, at most
-}
 
 
 @dataclass(frozen=True)
@@ -67,7 +62,7 @@ class SweepSpec:
     startup: int = 10  # random trials before TPE begins
     base_first: bool = True  # the base's own setting is the first trial
     seed: int = 0  # of the sampler
-    objectives: tuple[Metric, ...] = ("gain",)
+    objectives: tuple[str, ...] = ("gain",)  # metrics of one of `sweeps.questions`
     constraints: dict[str, float] = field(default_factory=dict)  # metric → most it may be
     pruner: Pruner = Pruner()
     confirm: Confirm = Confirm()
@@ -75,6 +70,11 @@ class SweepSpec:
 
     def __post_init__(self) -> None:
         check_sweep(self)
+
+    @property
+    def question(self) -> Question[Any]:
+        """What is asked of a setting: whose metrics the objectives are."""
+        return question_of(self.objectives, f"sweep {self.name}, objectives")
 
     @property
     def points(self) -> list[dict[str, int | float | bool | str]]:
@@ -96,13 +96,10 @@ def check_sweep(sweep: SweepSpec) -> None:
             raise UsageError(f"{where}, {name}: must be at least 1")
     if not sweep.objectives or len(set(sweep.objectives)) < len(sweep.objectives):
         raise UsageError(f"{where}, objectives: name one or more, each once")
-    if unknown := [name for name in sweep.constraints if name not in MAXIMISED]:
-        raise UsageError(
-            f"{where}, constraints: unknown metric {unknown[0]!r}; there are {', '.join(MAXIMISED)}"
-        )
+    question_of([*sweep.objectives, *sweep.constraints], f"{where}, objectives and constraints")
     if sweep.pruner.rounds < 1 or not 0 < sweep.pruner.p < 1:
         raise UsageError(f"{where}, pruner: rounds must be at least 1, and 0 < p < 1")
-    if sweep.pruner.rounds > 1 and sweep.objectives[0] == "imagined":
+    if sweep.pruner.rounds > 1 and not METRICS[sweep.objectives[0]].by_episode:
         raise UsageError(f"{where}, pruner: compares scores: make gain or score the objective")
     if sweep.pruner.rounds > 1 and len(sweep.objectives) > 1:
         raise UsageError(f"{where}, pruner: works with one objective; set rounds = 1")
@@ -115,7 +112,7 @@ def check_sweep(sweep: SweepSpec) -> None:
     if sweep.tables and any(not path.startswith("mb_stitch.") for path in sweep.space):
         raise UsageError(f"{where}, tables: a table compares methods, not models: search mb_stitch")
     base = base_spec(sweep)
-    check_space(sweep.space, base, f"{where}, space")
+    check_space(sweep.space, base, sweep.question.searched, f"{where}, space")
     if sweep.budget < 1:
         raise UsageError(f"{where}, space: a grid without points")
     searched, held_out = split_tasks(sweep, base)
@@ -128,6 +125,8 @@ def check_sweep(sweep: SweepSpec) -> None:
             "would not be new; hold out tasks whose first two skills the search never joins"
         )
     replace(base, tasks=tuple(map(">".join, [*searched, *held_out])), lengths=())
+    asked = replace(base, tasks=tuple(map(">".join, searched)), lengths=())
+    sweep.question.check(asked, where)
     fresh = sweep.confirm.root_seed not in (None, base.root_seed)
     if used := [seed for seed in sweep.confirm.seeds if seed < base.seeds and not fresh]:
         raise UsageError(
@@ -140,8 +139,8 @@ def base_spec(sweep: SweepSpec) -> Spec:
     """The run spec that trials change, with the sweep's settings."""
     loaded = load_spec(sweep.base, sweep.scale)
     where = f"sweep {sweep.name}, settings"
-    plain = merged(to_plain(loaded), sweep.settings) | {"methods": ["no-stitch", "mb-stitch"]}
-    return spec_from_plain(plain | {"tables": []}, where)
+    plain = merged(to_plain(loaded), sweep.settings)
+    return spec_from_plain(plain | {"methods": sweep.question.methods, "tables": []}, where)
 
 
 Task = tuple[str, ...]

@@ -28,8 +28,9 @@ from optuna.trial import FrozenTrial, TrialState, create_trial
 from orchestrator.errors import StorageError
 from orchestrator.store import storage_errors
 from stitching.streams import stream
+from sweeps.questions import METRICS
 from sweeps.space import Fields, current
-from sweeps.spec import MAXIMISED, SweepSpec, base_spec
+from sweeps.spec import SweepSpec, base_spec
 
 RESULT = "result"  # user attribute: a trial's metrics, there before any of its batch is told
 JOURNAL = "study.journal"
@@ -126,7 +127,7 @@ class SweepStudy:
 
         By the first objective; of equals, the earlier one is the better.
         """
-        sign = -1 if MAXIMISED[self.sweep.objectives[0]] else 1
+        sign = -1 if METRICS[self.sweep.objectives[0]].maximised else 1
         kept = [t for t in self.finished if feasible(t) and not t.user_attrs[RESULT]["pruned"]]
         return sorted(kept, key=lambda trial: (sign * trial.values[0], trial.number))
 
@@ -145,8 +146,9 @@ class SweepStudy:
             return points[number]
         if number == 0 and sweep.base_first:
             base = base_spec(sweep)
-            own = {path: current(base, path) for path in sweep.space}
-            if all(sweep.space[path].holds(value) for path, value in own.items()):
+            values = {path: current(base, path) for path in sweep.space}
+            own = {path: value for path, value in values.items() if value is not None}
+            if own.keys() == values.keys() and all(sweep.space[p].holds(own[p]) for p in own):
                 return own
         # On a copy, for there a trial may be written piece by piece.
         copy = optuna.create_study(directions=directions(sweep), sampler=sampler(sweep, number))
@@ -187,7 +189,7 @@ def expected(metric: str) -> str:
 
 def directions(sweep: SweepSpec) -> list[StudyDirection]:
     return [
-        StudyDirection.MAXIMIZE if MAXIMISED[name] else StudyDirection.MINIMIZE
+        StudyDirection.MAXIMIZE if METRICS[name].maximised else StudyDirection.MINIMIZE
         for name in sweep.objectives
     ]
 

@@ -59,7 +59,8 @@ def carry_out(
         finished = False
         try:
             with storage_errors(directory.path):
-                arena.prepare(search_spec(sweep))
+                if sweep.question.shared:  # else every trial has its own models, as it comes
+                    arena.prepare([search_spec(sweep)])
                 with arena.quietly():
                     for _ in run_search(sweep, study, arena, progress):
                         _write_results(directory, study, arena.tally, earlier)

@@ -76,7 +76,7 @@ class Tracker:
             tags=parent.tags | {"skillstitch.trial": number},
             params={allowed_name(k): short_text(v) for k, v in trial["fields"].items()}
             | {"method": short_text(trial["method"])},
-            numbers=finite({k: v for k, v in trial.items() if k not in HIDDEN}),
+            numbers=finite(leaves({k: v for k, v in trial.items() if k not in HIDDEN}, "/")),
             curves={},
         )
 

@@ -31,7 +31,7 @@ def find_sweep(name: str) -> Path:
 
 
 def with_winner(spec: Spec, name: str) -> Spec:
-    """A spec with a sweep's winner as its own setting of MB-Stitch (and of its models)."""
+    """A spec with a sweep's winner as its own setting of MB-Stitch, of its models or its data."""
     path = find_sweep(name)
     winner: Plain = RunDirectory(path).read_json("winner.json")
     if winner["benchmark"] != spec.benchmark:

@@ -56,8 +56,8 @@ def test_the_plan_alone_runs_nothing(tmp_path: Path, capsys: pytest.CaptureFixtu
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["sweep"], "needs a sweep: kitchen-search, maze-alpha-beta, table9"),
-        (["sweep", "table2"], "no sweep 'table2': neither a file nor one of kitchen-search"),
+        (["sweep"], "needs a sweep: kitchen-data, kitchen-search, maze-alpha-beta, table9"),
+        (["sweep", "table2"], "no sweep 'table2': neither a file nor one of kitchen-data"),
         (["run", "table1", "--from-sweep", "nothing"], "no sweep 'nothing'"),
     ],
 )
