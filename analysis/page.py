@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from analysis.figures import Drawn
-from analysis.page_studies import models_section, pairs_section, stitches_section
+from analysis.page_studies import models_section, pairs_section, rates_section, stitches_section
 from analysis.page_tables import claims_html, gains_html, html_table, scores_html
 from analysis.run import Run
 from analysis.skills import permutation_scores, single_skill_rates
@@ -57,6 +57,7 @@ def render_page(
                 if not figure.table and figure.name not in OF_MODELS + OF_STITCHES
             ),
         ),
+        "rates": ("What there is to stitch", rates_section(studies.get("rates"))),
         "pairs": ("Pairs of skills", pairs_section(run, studies.get("pair-groups"))),
         "models": (
             "Are the models right?",

@@ -125,7 +125,7 @@ def _markdown_scores(table: Table) -> str:
         lines.append(short_of(table, cell["row"], cell["method"]))
         texts[cell["row"], cell["method"]] = "<br>".join(filter(None, lines))
     header = ["Task", *(table.labels[method] for method in table.methods)]
-    return _markdown_table(
+    return markdown_table(
         header,
         [[row, *(texts.get((row, m), "") for m in table.methods)] for row in table.rows],
     )
@@ -133,7 +133,7 @@ def _markdown_scores(table: Table) -> str:
 
 def _markdown_gains(table: Table) -> str:
     header = ["Task", "Method", "over", "Gain", "95 % interval", "Relative", "Pairs", "Seeds"]
-    return _markdown_table(
+    return markdown_table(
         header, [gain_texts(table, gain) for gain in table.gains.to_dict("records")]
     )
 
@@ -153,7 +153,8 @@ def gain_texts(table: Table, gain: Record) -> list[str]:
     ]
 
 
-def _markdown_table(header: list[str], rows: list[list[str]]) -> str:
+def markdown_table(header: list[str], rows: list[list[str]]) -> str:
+    """A plain table of text."""
     lines = [header, ["---"] * len(header), *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 

@@ -33,7 +33,7 @@ from stitching.models.dynamics import DynamicsConfig
 from stitching.models.iql import IQLConfig
 from stitching.rollout import RolloutConfig
 
-Scale = Literal["smoke", "quick", "paper"]
+Scale = Literal["smoke", "quick", "standard", "paper"]
 NAME = re.compile(r"[A-Za-z0-9][\w.-]*")  # becomes part of paths
 
 

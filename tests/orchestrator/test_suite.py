@@ -17,6 +17,7 @@ from orchestrator.merge import (
     Naming,
     anatomy_of_part,
     describe_suite,
+    diagnosis_of_part,
     merge_again,
     showcase_of_part,
 )
@@ -190,6 +191,17 @@ def test_stitches_taken_apart_are_kept_by_part(done: Path, tmp_path: Path) -> No
     assert renamed["pairs"] == [{"first": "short:g0", "second": "short:g1", "arrived": 1}]
     assert renamed["stitches"][0]["second"] == "short:g1"
     assert renamed["typical_distance"] == {"short:g1": 0.1}
+
+
+def test_what_is_known_of_models_is_kept_by_part(tmp_path: Path) -> None:
+    suite = lists(tmp_path)
+    study = {
+        "predictions": {"1": {}},
+        **dict.fromkeys(("values", "prices", "competence"), {"g0": 1}),
+    }
+    renamed = diagnosis_of_part(study, Naming(suite, suite.parts[0]))
+    assert renamed["predictions"] == {"1": {}}
+    assert all(renamed[name] == {"short:g0": 1} for name in ("values", "prices", "competence"))
 
 
 def test_every_part_is_shown_under_the_names_of_the_whole(done: Path, tmp_path: Path) -> None:
