@@ -197,7 +197,7 @@ def test_what_is_known_of_models_is_kept_by_part(tmp_path: Path) -> None:
     suite = lists(tmp_path)
     study = {
         "predictions": {"1": {}},
-        **dict.fromkeys(("values", "prices", "competence"), {"g0": 1}),
+        **{name: {"g0": 1} for name in ("values", "prices", "competence")},
     }
     renamed = diagnosis_of_part(study, Naming(suite, suite.parts[0]))
     assert renamed["predictions"] == {"1": {}}
@@ -255,3 +255,10 @@ def test_the_other_commands(done: Path, capsys: pytest.CaptureFixture[str]) -> N
     main(["run", str(SUITE), "--scale", "smoke", "--out", out, *store, *words])
     assert "# Two data sets" in capsys.readouterr().out
     assert (done / "results" / "levels" / "scores.csv").is_file()
+
+
+@pytest.mark.parametrize("name", ["table3", "table5"])
+def test_the_standard_scale_is_the_paper_s_seeds_and_half_its_episodes(name: str) -> None:
+    suite = load_asked(name, "standard")
+    assert isinstance(suite, Suite)
+    assert {(part.spec.seeds, part.spec.episodes) for part in suite.parts} == {(3, 50)}
