@@ -24,7 +24,7 @@ from stitching.streams import stream
 class RobosuiteDataConfig:
     quality: float = 1.0  # of the hand: from 1, an expert, down to 0, who misses most of the time
     episodes: int = 100  # demonstrations a skill
-    held_out: int = 30  # more of each skill, to judge models by
+    held_out: int = 50  # more of each skill, to judge models by
     skill_steps: int = 40  # actions after which a skill counts as missed
     keep_failures: bool = True  # what a clumsy hand misses is data, too
 
