@@ -6,7 +6,8 @@ Beside it the two variances of Eq. 2, for β means something only beside the sca
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -57,16 +58,17 @@ def _rows(run: Run, label: str, spec: RunSpec) -> Iterator[Record]:
             continue
         own, met = study["competence"][skill], after[after["second"] == skill]
         price = study.get("prices", {}).get(skill, {})
-        spreads = {name: price.get(name, math.nan) for name in ("value_spread", "dynamics_spread")}
+        values, states = (price.get(f"{of}_spread", math.nan) for of in ("value", "dynamics"))
         beta = run.anatomy.get(label, {}).get("beta", math.nan)
         yield {
             "part": label,
             "skill": run.spec.skill_label(skill),
             **_rate("own", own["successes"], own["trials"]),
             **_rate("after", int(met["success"].sum()), len(met)),
-            **spreads,
+            "value_spread": values,
+            "dynamics_spread": states,
             "beta": beta,
-            "beta_scaled": beta * spreads["value_spread"] / spreads["dynamics_spread"],
+            "beta_scaled": beta * values / states if states else math.nan,
         }
 
 
@@ -78,7 +80,7 @@ def _after_another(segments: pd.DataFrame, spec: RunSpec) -> pd.DataFrame:
     return seconds[np.array(plain, dtype=bool) & seconds["task"].isin(pairs)]
 
 
-def _rate(name: str, successes: int, trials: int) -> Record:
+def _rate(name: str, successes: int, trials: int) -> dict[Hashable, Any]:
     low, high = wilson(np.array(successes), np.array(trials))
     return {
         f"{name}_successes": successes,

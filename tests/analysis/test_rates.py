@@ -49,8 +49,8 @@ def merged_run(write_run: Any, folder: Path) -> Path:
 
 def test_rates_of_every_skill_of_a_run(tmp_path: Path, write_run: Any) -> None:
     rates = rate_table(load_run(write_kitchen(write_run, tmp_path / "run"))).set_index("skill")
-    kettle = rates.loc["kettle"]
-    assert kettle[["own_successes", "own_trials"]].tolist() == [97, 100]
+    kettle = rates.to_dict("index")["kettle"]
+    assert (kettle["own_successes"], kettle["own_trials"]) == (97, 100)
     plain = kitchen_segments().query("method == 'no-stitch' and prefix.str.endswith('>kettle')")
     assert kettle["after_successes"] == plain["success"].sum()
     assert kettle["after_trials"] == len(plain)
