@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from analysis.figures import Drawn
-from analysis.page_studies import models_section, pairs_section, stitches_section
+from analysis.page_studies import models_section, pairs_section, rates_section, stitches_section
 from analysis.page_tables import claims_html, gains_html, html_table, scores_html
 from analysis.profile_text import TITLE as PROFILE_TITLE
 from analysis.profile_text import profile_section
@@ -60,6 +60,7 @@ def render_page(
             ),
         ),
         "profile": (PROFILE_TITLE, profile_section(studies.get("profile"), run.spec)),
+        "rates": ("What there is to stitch", rates_section(studies.get("rates"))),
         "pairs": ("Pairs of skills", pairs_section(run, studies.get("pair-groups"))),
         "models": (
             "Are the models right?",

@@ -9,6 +9,7 @@ import pandas as pd
 from analysis.anatomy import FIRST_SKILLS, HAND_OVERS, OUTCOMES, WARNINGS, by_kind, label
 from analysis.page_tables import html_table
 from analysis.pairs import BASELINE, shown_orders
+from analysis.rates import HEADER, NOTE, rate_lines
 from analysis.run import Run
 from analysis.writers import Record, seed_note
 
@@ -65,6 +66,13 @@ def _gain(row: Record, name: str) -> str:
 
 def _unbroken(text: str) -> str:
     return text.replace(" ", "\N{NO-BREAK SPACE}")
+
+
+def rates_section(rates: pd.DataFrame | None) -> str:
+    """Each skill's rates from its own starts and after others; nothing without a diagnosis."""
+    if rates is None:
+        return ""
+    return html_table(HEADER, rate_lines(rates)) + _note(NOTE)
 
 
 def models_section(run: Run, models: pd.DataFrame | None) -> str:

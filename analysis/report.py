@@ -16,10 +16,11 @@ from analysis.page import render_page
 from analysis.pairs import both_skills, pair_groups, pair_table, second_skills, shown_orders
 from analysis.profile import profiles
 from analysis.profile_text import profile_markdown
+from analysis.rates import HEADER, NOTE, rate_lines, rate_table
 from analysis.run import Run, load_run
 from analysis.skills import permutation_scores
 from analysis.tables import Table, build_table
-from analysis.writers import to_csv, to_latex, to_markdown
+from analysis.writers import markdown_table, to_csv, to_latex, to_markdown
 
 Studies = dict[str, pd.DataFrame]
 
@@ -86,7 +87,7 @@ def _build(run_dir: Path) -> tuple[list[Table], Studies, list[Drawn]]:
         drawn = draw_figures(run, tables, report / "figures")
         for table in tables:
             name = table.entry.id
-            _write(report / f"{name}.md", to_markdown(table))
+            _write(report / f"{name}.md", to_markdown(table) + _markdown_rates(studies))
             _write(report / f"{name}.tex", to_latex(table))
             _write(report / f"{name}.csv", to_csv(table.scores))
             _write(report / f"{name}-gains.csv", to_csv(table.gains))
@@ -114,9 +115,18 @@ def _studies(run: Run) -> Studies:
         studies["profile"] = beside_table_8
     if run.diagnosis:
         studies["models"] = model_table(run)
+    if run.diagnoses:
+        studies["rates"] = rate_table(run)
     if run.anatomy:
         studies["anatomy"], studies["stitches"] = anatomy_table(run), stitch_table(run)
     return studies
+
+
+def _markdown_rates(studies: Studies) -> str:
+    if "rates" not in studies:
+        return ""
+    lines = markdown_table(HEADER, rate_lines(studies["rates"]))
+    return f"\n## What there is to stitch\n\n{lines}\n\n{NOTE}\n"
 
 
 def _write(path: Path, text: str) -> None:

@@ -160,8 +160,13 @@ class Run:
     training: list[dict[str, Any]]
     showcases: dict[str, Any]  # by part, as `anatomy`
     datasets: list[dict[str, Any]]
-    diagnosis: dict[str, Any]
+    diagnoses: dict[str, Any]  # by part, as `anatomy`
     anatomy: dict[str, Any]  # by part, of a merged run; else by "" alone
+
+    @property
+    def diagnosis(self) -> dict[str, Any]:
+        """Of a run that was not merged: what its report says of its models; {} if unknown."""
+        return self.diagnoses.get("", {})
 
 
 def load_run(run_dir: Path) -> Run:
@@ -183,7 +188,7 @@ def load_run(run_dir: Path) -> Run:
         training=_read_json(run_dir / "training.json", []),
         showcases=_by_part(_read_json(run_dir / "showcase.json", {})),
         datasets=_read_json(run_dir / "datasets.json", []),
-        diagnosis=_read_json(run_dir / "diagnosis.json", {}),
+        diagnoses=_by_part(_read_json(run_dir / "diagnosis.json", {})),
         anatomy=_by_part(_read_json(run_dir / "anatomy.json", {})),
     )
 

@@ -166,7 +166,11 @@ def write_merged(suite: Suite, directory: RunDirectory, run_id: str) -> None:
     directory.write_json("quarantine.json", gathered("quarantine.json", _given_up))
     directory.write_json("training.json", gathered("training.json", _trained))
     directory.write_json("datasets.json", gathered("datasets.json", _dataset))
-    for name, of_part in (("anatomy.json", anatomy_of_part), ("showcase.json", showcase_of_part)):
+    for name, of_part in {
+        "anatomy.json": anatomy_of_part,
+        "diagnosis.json": diagnosis_of_part,
+        "showcase.json": showcase_of_part,
+    }.items():
         found = {label: part.read_json(name) for label, part in there.items()}
         parts = {label: of_part(one, named[label]) for label, one in found.items() if one}
         if parts:
@@ -223,6 +227,14 @@ def anatomy_of_part(study: Plain, naming: Naming) -> Plain:
         "pairs": [renamed(pair) for pair in study["pairs"]],
         "stitches": [renamed(stitch) for stitch in study["stitches"]],
         "typical_distance": {naming.skill(skill): distance for skill, distance in typical},
+    }
+
+
+def diagnosis_of_part(study: Plain, naming: Naming) -> Plain:
+    """What is known of a part's models, of skills as they are called where all parts meet."""
+    return study | {
+        name: {naming.skill(skill): found for skill, found in study[name].items()}
+        for name in ("values", "prices", "competence")
     }
 
 

@@ -1,13 +1,14 @@
 """What to know of models before a planner is judged by them: all on data that none was trained on.
 
 Of the dynamics how far their predictions are off and whether the ensemble's disagreement says so;
-of the values whether they rise along demonstrations; of the policies whether they work where their
-own data begin.
+of the values whether they rise along demonstrations; of both how large the two variances of Eq. 2
+are; of the policies whether they work where their own data begin.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from stitching.data.transitions import Transitions
 from stitching.envs.protocol import Benchmark
 from stitching.models.agent import Agent
 from stitching.models.dynamics import Dynamics
-from stitching.planning.objective import spread_over_members
+from stitching.planning.objective import NORMS, spread_over_members
 from stitching.rollout import Play, RolloutConfig, play_segment
 from stitching.stitchers import NoStitch
 
@@ -85,7 +86,7 @@ def _rank_correlation(first: Any, second: Any) -> float:
 
 @torch.inference_mode()
 def value_progress(agent: Agent, benchmark: Benchmark, data: Transitions) -> dict[str, Any]:
-    """How E[V] rises along each skill's demonstrations: per skill, on average over them.
+    """How E[V] rises along each skill's successful demonstrations: per skill, on average over them.
 
     "rank_correlation" is Spearman's, of value with time, each demonstration by itself; "mean" and
     "spread" (of the members) are averages at equal shares of progress.
@@ -93,7 +94,8 @@ def value_progress(agent: Agent, benchmark: Benchmark, data: Transitions) -> dic
     study = {}
     for index, skill in enumerate(benchmark.skills):
         correlations, curves, spreads = [], [], []
-        for rows in data.episode_rows(index):
+        own = data.episode_successes[data.episode_skills == index]
+        for rows in compress(data.episode_rows(index), own):
             values = agent.values(torch.from_numpy(data.observations[rows]), index)
             mean, spread = values.mean(dim=0).numpy(), spread_over_members(values).numpy()
             if len(rows) > 2:
@@ -110,6 +112,34 @@ def value_progress(agent: Agent, benchmark: Benchmark, data: Transitions) -> dic
                 "spread": np.mean(spreads, axis=0).tolist(),
                 "curves": np.array(curves[:SHOWN_CURVES]).round(4).tolist(),
             }
+    return study
+
+
+@torch.inference_mode()
+def prices(
+    agent: Agent, dynamics: Dynamics, benchmark: Benchmark, data: Transitions, horizon: int
+) -> dict[str, Any]:
+    """The two variances of Eq. 2 after `horizon` demonstrated actions: per skill, on average.
+
+    As a planner has them: values at the mean of the members' predicted states, each dynamics member
+    on a path of its own, Var(T) by the norm "mean". Where α and β are equal, Var(T) costs
+    "dynamics_spread" / "value_spread" times what Var(V) does.
+    """
+    study = {}
+    for index, skill in enumerate(benchmark.skills):
+        within = [rows[: max(0, len(rows) - horizon + 1)] for rows in data.episode_rows(index)]
+        first = np.concatenate([np.zeros(0, dtype=np.int64), *within])
+        if not len(first):
+            continue
+        sequences = torch.from_numpy(data.actions[first[:, None] + np.arange(horizon)])
+        imagined = dynamics.imagine(torch.from_numpy(data.observations[first]), sequences)
+        values = agent.values(imagined.mean(dim=0), index)
+        disagreement = NORMS["mean"](spread_over_members(dynamics.scaled(imagined)))
+        study[skill.name] = {
+            "states": len(first),
+            "value_spread": float(spread_over_members(values).mean()),
+            "dynamics_spread": float(disagreement.mean()),
+        }
     return study
 
 

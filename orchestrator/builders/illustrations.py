@@ -10,7 +10,7 @@ from orchestrator.builders.parts import Inputs
 from orchestrator.methods import make_stitcher
 from orchestrator.structure import Plain, structure
 from stitching.data.transitions import Transitions
-from stitching.diagnosis import competence, prediction_errors, value_progress
+from stitching.diagnosis import competence, prediction_errors, prices, value_progress
 from stitching.envs.protocol import Benchmark
 from stitching.envs.registry import BENCHMARKS
 from stitching.rollout import RolloutConfig
@@ -49,6 +49,7 @@ def diagnosis(
     return {
         "predictions": prediction_errors(dynamics, data, groups, params["horizon"]),
         "values": value_progress(agent, benchmark, data),
+        "prices": prices(agent, dynamics, benchmark, data, params["horizon"]),
         "competence": competence(
             agent, benchmark, rollout, params["step_limit"], data, starts, *seeds
         ),

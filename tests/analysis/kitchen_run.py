@@ -154,6 +154,10 @@ def kitchen_files() -> dict[str, Any]:
                         "spread": [0.5] * 21, "curves": [curve] * 3}
                 for skill in SKILLS
             },
+            "prices": {
+                skill: {"states": 30, "value_spread": 0.04, "dynamics_spread": 0.08}
+                for skill in SKILLS
+            },
             "competence": {
                 skill: {"trials": 100, "successes": 97, "steps": 50.0} for skill in SKILLS
             },

@@ -17,6 +17,7 @@ from orchestrator.merge import (
     Naming,
     anatomy_of_part,
     describe_suite,
+    diagnosis_of_part,
     merge_again,
     showcase_of_part,
 )
@@ -211,6 +212,17 @@ def test_parts_may_differ_in_whether_first_skills_are_stitched_to(tmp_path: Path
     assert Naming(suite, plain).played_by("") == ["", "mb-stitch"]
 
 
+def test_what_is_known_of_models_is_kept_by_part(tmp_path: Path) -> None:
+    suite = lists(tmp_path)
+    study = {
+        "predictions": {"1": {}},
+        **{name: {"g0": 1} for name in ("values", "prices", "competence")},
+    }
+    renamed = diagnosis_of_part(study, Naming(suite, suite.parts[0]))
+    assert renamed["predictions"] == {"1": {}}
+    assert all(renamed[name] == {"short:g0": 1} for name in ("values", "prices", "competence"))
+
+
 def test_every_part_is_shown_under_the_names_of_the_whole(done: Path, tmp_path: Path) -> None:
     shown = RunDirectory(done / "out").read_json("showcase.json")["parts"]
     assert list(shown) == ["level-1", "level-2"]
@@ -262,3 +274,10 @@ def test_the_other_commands(done: Path, capsys: pytest.CaptureFixture[str]) -> N
     main(["run", str(SUITE), "--scale", "smoke", "--out", out, *store, *words])
     assert "# Two data sets" in capsys.readouterr().out
     assert (done / "results" / "levels" / "scores.csv").is_file()
+
+
+@pytest.mark.parametrize("name", ["table3", "table5"])
+def test_the_standard_scale_is_the_paper_s_seeds_and_half_its_episodes(name: str) -> None:
+    suite = load_asked(name, "standard")
+    assert isinstance(suite, Suite)
+    assert {(part.spec.seeds, part.spec.episodes) for part in suite.parts} == {(3, 50)}

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from stitching.data.transitions import Transitions
-from stitching.diagnosis import competence, prediction_errors, value_progress
+from stitching.diagnosis import competence, prediction_errors, prices, value_progress
 from stitching.envs.maze import Maze
 from stitching.models.agent import Agent
 from stitching.models.dynamics import Dynamics
@@ -66,6 +66,38 @@ def test_values_rise_along_demonstrations(
         assert skill["rank_correlation"] > 0.8
         assert skill["mean"][-1] > skill["mean"][0]
         assert len(skill["mean"]) == len(skill["spread"]) == len(skill["curves"][0])
+
+
+def test_values_of_failures_are_left_out(
+    maze: Maze, demonstrations: Transitions, agent: Agent
+) -> None:
+    none = np.zeros_like(demonstrations.episode_successes)
+    assert value_progress(agent, maze, replace(demonstrations, episode_successes=none)) == {}
+
+
+def test_prices_are_the_variances_of_equation_2(
+    maze: Maze, demonstrations: Transitions, agent: Agent, dynamics: Dynamics
+) -> None:
+    study = prices(agent, dynamics, maze, demonstrations, horizon=2)
+    assert set(study) == {skill.name for skill in maze.skills}
+    (rows,) = demonstrations.episode_rows(0)[:1]
+    own = study[maze.skills[0].name]
+    one = Transitions(
+        observations=demonstrations.observations[rows[:2]],
+        actions=demonstrations.actions[rows[:2]],
+        next_observations=demonstrations.next_observations[rows[:2]],
+        episode_ends=np.array([2]),
+        episode_skills=np.array([0]),
+        episode_successes=np.array([True]),
+    )
+    alone = prices(agent, dynamics, maze, one, horizon=2)[maze.skills[0].name]
+    assert alone["states"] == 1 < own["states"]
+    sequence = torch.from_numpy(one.actions)[None]
+    imagined = dynamics.imagine(torch.from_numpy(one.observations[:1]), sequence)
+    values = agent.values(imagined.mean(dim=0), 0)
+    assert alone["value_spread"] == pytest.approx(float(values.std(dim=0, correction=0)), rel=1e-4)
+    spread = dynamics.scaled(imagined).std(dim=0, correction=0).mean()
+    assert alone["dynamics_spread"] == pytest.approx(float(spread), rel=1e-4)
 
 
 def test_policies_are_tried_where_their_demonstrations_begin(

@@ -12,6 +12,7 @@ from stitching.data.robosuite.demonstrations import (
     RobosuiteDataConfig,
     collect,
     demonstrate,
+    held_out,
     starts,
 )
 from stitching.data.robosuite.programs import PROGRAMS, Hand, object_frame, style
@@ -133,6 +134,13 @@ def test_a_collection_can_be_trained_on(benchmark: Door | Can) -> None:
     good = collect(benchmark, replace(config, keep_failures=False), 0)
     assert good.episode_successes.all()
     assert len(good.episode_ends) == data.episode_successes.sum()
+
+
+def test_held_out_starts_count_whether_the_hand_succeeds_or_not() -> None:
+    config = RobosuiteDataConfig(episodes=EPISODES, held_out=3, quality=0.3, skill_steps=18)
+    data, begun = held_out(DOOR, config, 0)
+    assert len(begun) == len(data.episode_ends) == 3 * len(DOOR.skills)
+    assert 0 < data.episode_successes.sum() < len(begun)
 
 
 def test_nothing_achieved_is_no_dataset() -> None:
