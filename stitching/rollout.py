@@ -21,10 +21,14 @@ from stitching.streams import stream
 class RolloutConfig:
     """How skills are executed; step limits of whole tasks belong to the spec."""
 
-    sample_actions: bool = False  # sample the policy; its mode otherwise, as in IQL's evaluation
+    temperature: float = 0.0  # of the policy: 0 its mode, as in IQL's evaluation; 1 as learned
     skill_limit: int = 0  # most steps of one skill, its stitch included; 0: only the task's own
     stop_alpha: float = 0.0  # price of the values' disagreement when a stitch asks whether to go on
     first_stitch: bool = False  # stitch before a task's first skill, too, as Algorithm 1 is printed
+
+    def __post_init__(self) -> None:
+        if self.temperature < 0:
+            raise ValueError(f"temperature: must not be negative: {self.temperature}")
 
 
 @dataclass(frozen=True)
@@ -186,9 +190,10 @@ def _execute(
     while len(rows):
         states = torch.from_numpy(progress.block.observe(rows))
         noise = None
-        if config.sample_actions:
+        if config.temperature:
             noise = policy_noise(benchmark.actions, [streams[row] for row in rows])
-        progress.step(rows, agent.act(states, progress.skill, noise), "execute")
+        actions = agent.act(states, progress.skill, noise, config.temperature)
+        progress.step(rows, actions, "execute")
         rows = progress.open(rows)
 
 

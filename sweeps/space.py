@@ -119,6 +119,16 @@ def check_space(space: Space, spec: Spec, parts: Sequence[str], where: str) -> N
         replaced(spec, fields, f"{where}, at {describe(fields)}")
 
 
+def check_enqueued(enqueued: Sequence[Fields], space: Space, where: str) -> None:
+    """UsageError for a trial that does not say each field of the space, within its range."""
+    for number, fields in enumerate(enqueued):
+        if fields.keys() != space.keys():
+            raise UsageError(f"{where}, {number}: expected a value for each of {', '.join(space)}")
+        for path, value in fields.items():
+            if not space[path].holds(value):
+                raise UsageError(f"{where}, {number}, {path}: {value!r} is outside its range")
+
+
 def grid_points(space: Space, where: str) -> list[Fields]:
     """All combinations, the last field varying fastest."""
     values = [dimension.grid(f"{where}, {path}") for path, dimension in space.items()]

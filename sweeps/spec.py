@@ -20,7 +20,7 @@ from orchestrator.tomls import load_toml, toml_names
 from stitching.streams import stream
 from sweeps.questions import METRICS, question_of
 from sweeps.questions.question import Question
-from sweeps.space import Space, check_space, grid_points
+from sweeps.space import Space, Value, check_enqueued, check_space, grid_points
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,7 @@ class SweepSpec:
     trials: int = 40  # the grid: all its points
     batch: int = 4  # trials asked at once; part of what makes the study
     startup: int = 10  # random trials before TPE begins
+    enqueued: tuple[dict[str, Value], ...] = ()  # tried first, in this order; may grow
     base_first: bool = True  # the base's own setting is the first trial
     seed: int = 0  # of the sampler
     objectives: tuple[str, ...] = ("gain",)  # metrics of one of `sweeps.questions`
@@ -112,6 +113,9 @@ def check_sweep(sweep: SweepSpec) -> None:
     if sweep.tables and any(not path.startswith("mb_stitch.") for path in sweep.space):
         raise UsageError(f"{where}, tables: a table compares methods, not models: search mb_stitch")
     base = base_spec(sweep)
+    if sweep.enqueued and sweep.sampler == "grid":
+        raise UsageError(f"{where}, enqueued: a grid has its own order")
+    check_enqueued(sweep.enqueued, sweep.space, f"{where}, enqueued")
     check_space(sweep.space, base, sweep.question.searched, f"{where}, space")
     if sweep.budget < 1:
         raise UsageError(f"{where}, space: a grid without points")

@@ -144,6 +144,8 @@ class SweepStudy:
         sweep = self.sweep
         if points := sweep.points:
             return points[number]
+        if number < len(sweep.enqueued):
+            return {path: sweep.enqueued[number][path] for path in sweep.space}
         if number == 0 and sweep.base_first:
             base = base_spec(sweep)
             values = {path: current(base, path) for path in sweep.space}

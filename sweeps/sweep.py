@@ -22,7 +22,7 @@ from sweeps.study import RESULT, SweepStudy, feasible
 from sweeps.table import write_table
 from sweeps.tracking import Tracker
 
-MAY_CHANGE = ("trials", "confirm", "title", "tables")  # under a study that goes on
+MAY_CHANGE = ("trials", "enqueued", "confirm", "title", "tables")  # under a study that goes on
 
 
 def default_out(sweep: SweepSpec) -> Path:

@@ -73,19 +73,26 @@ class Agent:
         v = self._networks[condition].v
         return mlp(v, self._inputs(states, condition)).squeeze(-1)
 
-    def act(self, states: Tensor, condition: int, noise: np.ndarray | None) -> np.ndarray:
+    def act(
+        self,
+        states: Tensor,
+        condition: int,
+        noise: np.ndarray | None,
+        temperature: float = 1.0,
+    ) -> np.ndarray:
         """Actions (n, action) float32: the policy's mode where `noise` is None, else samples.
 
         Discrete policies turn noise (n, 1), uniform in [0, 1), into a sample by inverting the
-        distribution function; Gaussian ones scale standard normal noise (n, action).
+        distribution function; Gaussian ones scale standard normal noise (n, action). The
+        temperature (above 0) divides logits, or multiplies the deviation, as in IQL's own code.
         """
         own = self._networks[condition]
         outputs = mlp(own.policy, self._inputs(states, condition)).squeeze(0)
         if self._actions.discrete:
-            return self._categorical(outputs, noise).numpy()
+            return self._categorical(outputs / temperature, noise).numpy()
         mean = outputs.tanh()
         if noise is not None:
-            mean = mean + torch.from_numpy(noise) * own.log_std.exp()
+            mean = mean + temperature * torch.from_numpy(noise) * own.log_std.exp()
         return mean.clamp(-1, 1).numpy()
 
     def _categorical(self, logits: Tensor, noise: np.ndarray | None) -> Tensor:

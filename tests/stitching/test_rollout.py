@@ -31,7 +31,7 @@ from stitching.rollout import (
 )
 from stitching.stitchers import NoStitch, Proposal, RandomStitch, Stitcher
 
-SAMPLED, MODE = RolloutConfig(sample_actions=True), RolloutConfig()
+SAMPLED, MODE = RolloutConfig(temperature=1.0), RolloutConfig()
 FIRST = replace(SAMPLED, first_stitch=True)
 STEP_LIMIT = 40
 METHODS = ["no-stitch", "random-stitch", "mf-stitch", "mb-stitch", "mb-stitch[execute=1]"]

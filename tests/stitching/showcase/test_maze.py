@@ -15,7 +15,7 @@ from stitching.showcase.maze import DEMONSTRATIONS, maze_showcase
 from stitching.showcase.shown import Shown
 from stitching.stitchers import Stitcher
 
-TASK, STEP_LIMIT, CONFIG = ("a", "b", "d"), 40, RolloutConfig(sample_actions=True)
+TASK, STEP_LIMIT, CONFIG = ("a", "b", "d"), 40, RolloutConfig(temperature=1.0)
 
 
 @pytest.fixture(scope="module")
