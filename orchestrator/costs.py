@@ -140,9 +140,17 @@ def _reference_seconds(recipe: Recipe) -> float:
     if recipe.kind in costs.update:
         return costs.update[recipe.kind] * float(config["updates"])
     if recipe.kind in costs.demonstration:
-        counted = "held_out" if "held-out" in recipe.kind else "episodes"
-        return costs.demonstration[recipe.kind] * float(config[counted])
+        return costs.demonstration[recipe.kind] * _demonstrations(recipe)
     return costs.whole.get(recipe.kind, OTHER_SECONDS)
+
+
+def _demonstrations(recipe: Recipe) -> float:
+    """How many a dataset asks for; orders may have more or fewer by their first skill."""
+    config = recipe.params["config"]
+    if "held-out" in recipe.kind:
+        return float(config["held_out"])
+    first = recipe.params.get("order", [""])[0]
+    return config["episodes"] * float(config.get("first_weights", {}).get(first, 1.0))
 
 
 def _skill_limit(spec: Spec, method: str) -> int:
@@ -181,5 +189,8 @@ def _training_history(store: Store) -> dict[tuple[str, str], float]:
 
 def _size_class(recipe: Recipe) -> tuple[str, str]:
     config = recipe.params.get("config", {})
-    size = [config.get(name) for name in ("updates", "width", "members", "episodes", "held_out")]
+    names = ("updates", "width", "members", "multi_task", "episodes", "held_out")
+    size = [config.get(name) for name in names]
+    if config.get("first_weights"):
+        size.append(_demonstrations(recipe))
     return recipe.kind, str(size)

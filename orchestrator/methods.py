@@ -139,12 +139,17 @@ def first_method(method: str, rollout: RolloutConfig) -> str:
 
 
 def method_rollout(method: str, rollout: RolloutConfig) -> RolloutConfig:
-    """How a method's skills are executed.
+    """What of the settings decides how a method's skills are executed.
 
     Where the policy is not told which skill is asked for, others may come in between: only the
-    task's limit binds it.
+    task's limit binds it. What cannot stitch to a first skill is played alike, asked to or not.
     """
-    return rollout if method_of(method).told else replace(rollout, skill_limit=0)
+    how = method_of(method)
+    return replace(
+        rollout,
+        skill_limit=rollout.skill_limit if how.told else 0,
+        first_stitch=rollout.first_stitch and how.stitcher.before_first,
+    )
 
 
 def method_block(method: str, benchmark: Benchmark) -> EpisodeBlock:
@@ -222,4 +227,6 @@ def make_stitcher(
             config.selective,
             config.price,
         )
+    if method_of(method).stitcher is not NoStitch:
+        raise NotImplementedError(f"method {method}: nothing makes its stitcher")
     return NoStitch()

@@ -54,7 +54,7 @@ def _mf_policy(params: Plain, inputs: Inputs) -> Artifact:
     benchmark, data = _checked_data(params, inputs)
     config = structure(IQLConfig, params["config"], "mf_stitch.training")
     skills = conditions(benchmark)
-    experience = mixed_experience(data, skills, params["mixture"])
+    experience = mixed_experience(data, skills, params["mixture"], config.gamma)
     starts = _next_policies(inputs["agent"], len(skills)) if "agent" in inputs else None
     actions, labels = benchmark.actions, _labels("mf-policy", params)
     if config.multi_task:

@@ -20,15 +20,18 @@ from stitching.data.transitions import Transitions
 
 Mixture = Literal["halves", "joined", "next-reward", "next-skill", "fine-tuned"]
 
-GAMMA = 0.99  # Table 6's
+
+def mixed_experience(
+    data: Transitions, conditions: np.ndarray, mixture: Mixture, gamma: float
+) -> Experience:
+    """The mixed dataset as one of the readings has it, for learning under a discount γ.
+
+    conditions: (skills, condition) float32.
+    """
+    return READINGS[mixture](data, conditions, gamma)
 
 
-def mixed_experience(data: Transitions, conditions: np.ndarray, mixture: Mixture) -> Experience:
-    """The mixed dataset as one of the readings has it. conditions: (skills, condition) float32."""
-    return READINGS[mixture](data, conditions)
-
-
-def halves(data: Transitions, conditions: np.ndarray) -> Experience:
+def halves(data: Transitions, conditions: np.ndarray, gamma: float) -> Experience:
     """Halves apart: reaching the middle of one of the next skill's demonstrations earns 1.
 
     Where the previous skill's demonstration ends, the data end too: bootstrapping there, from a
@@ -42,7 +45,7 @@ def halves(data: Transitions, conditions: np.ndarray) -> Experience:
     return gather(data, _of_both_skills(conditions), pieces)
 
 
-def joined(data: Transitions, conditions: np.ndarray) -> Experience:
+def joined(data: Transitions, conditions: np.ndarray, gamma: float) -> Experience:
     """A half of each skill as one trajectory, along which the value flows; its end earns 1.
 
     No such transition was ever made: the previous skill's last action is said to lead to where the
@@ -70,22 +73,22 @@ def joined(data: Transitions, conditions: np.ndarray) -> Experience:
     return gather(with_joints, _of_both_skills(conditions), pieces)
 
 
-def next_reward(data: Transitions, conditions: np.ndarray) -> Experience:
+def next_reward(data: Transitions, conditions: np.ndarray, gamma: float) -> Experience:
     """The next skill's own reward, which lies beyond the middle of its demonstrations.
 
     So a first half ends with that demonstration's own return from there: γ to the number of steps
     that it still took. The previous skill's half earns nothing.
     """
-    return _with_next_reward(data, _of_both_skills(conditions), len(conditions))
+    return _with_next_reward(data, _of_both_skills(conditions), len(conditions), gamma)
 
 
-def next_skill(data: Transitions, conditions: np.ndarray) -> Experience:
+def next_skill(data: Transitions, conditions: np.ndarray, gamma: float) -> Experience:
     """The same for a policy that knows of the next skill alone."""
     following = [following for _, following in skill_pairs(len(conditions))]
-    return _with_next_reward(data, conditions[following], len(conditions))
+    return _with_next_reward(data, conditions[following], len(conditions), gamma)
 
 
-READINGS: dict[Mixture, Callable[[Transitions, np.ndarray], Experience]] = {
+READINGS: dict[Mixture, Callable[[Transitions, np.ndarray, float], Experience]] = {
     "halves": halves,
     "joined": joined,
     "next-reward": next_reward,
@@ -108,13 +111,15 @@ def _of_both_skills(conditions: np.ndarray) -> np.ndarray:
     return np.array([np.concatenate([conditions[i], conditions[j]]) for i, j in pairs])
 
 
-def _with_next_reward(data: Transitions, conditions: np.ndarray, skills: int) -> Experience:
+def _with_next_reward(
+    data: Transitions, conditions: np.ndarray, skills: int, gamma: float
+) -> Experience:
     episodes = _episodes(data, skills)
     pieces = []
     for pair, (previous, following) in enumerate(skill_pairs(skills)):
         pieces += [Piece(_second(rows), pair, 0, ends=True) for rows in episodes[previous]]
         for rows in episodes[following]:
-            to_come = GAMMA ** len(_second(rows))
+            to_come = gamma ** len(_second(rows))
             pieces.append(Piece(_first(rows), pair, to_come, ends=True))
     return gather(data, conditions, pieces)
 

@@ -52,7 +52,7 @@ def agent(maze: Maze, demonstrations: Transitions) -> Agent:
 
 @pytest.fixture(scope="session")
 def mf_policy(maze: Maze, demonstrations: Transitions) -> Agent:
-    experience = mixed_experience(demonstrations, conditions(maze), "halves")
+    experience = mixed_experience(demonstrations, conditions(maze), "halves", TRAINING.gamma)
     trained = train_iql(experience, maze.actions, TRAINING, "mf-policy")
     return Agent(trained.weights, experience.conditions, maze.actions)
 

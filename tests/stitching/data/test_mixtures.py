@@ -13,6 +13,7 @@ from stitching.data.transitions import DataError, Transitions
 from tests.stitching.data.test_experience import CONDITIONS, SKILLS, dataset, episode, spans
 
 Row = tuple[float, float, tuple[float, ...], float, bool]  # from, to, condition, reward, terminal
+GAMMA = 0.95
 APART: list[Mixture] = ["halves", "next-reward", "next-skill", "fine-tuned"]
 
 
@@ -45,7 +46,7 @@ def expected(data: Transitions, mixture: Mixture) -> list[Row]:
             if data.episode_skills[number] == i:
                 rows += [(r, r + 1, condition, 0.0, r == end - 1) for r in range(middle, end)]
             if data.episode_skills[number] == j:
-                earned = 1.0 if mixture == "halves" else float(np.float32(0.99 ** (end - middle)))
+                earned = 1.0 if mixture == "halves" else float(np.float32(GAMMA ** (end - middle)))
                 for r in range(start, middle):
                     arrives = r == middle - 1
                     rows.append((r, r + 1, condition, earned if arrives else 0.0, arrives))
@@ -57,12 +58,12 @@ def expected(data: Transitions, mixture: Mixture) -> list[Row]:
 def test_halves_apart(mixture: Mixture, episodes: list[tuple[int, int, bool]]) -> None:
     data = dataset(episodes)
     if rows := expected(data, mixture):
-        experience = mixed_experience(data, CONDITIONS, mixture)
+        experience = mixed_experience(data, CONDITIONS, mixture, GAMMA)
         assert experience.data is data
         assert sorted(listed(experience)) == sorted(rows)
     else:
         with pytest.raises(DataError, match="no skill"):
-            mixed_experience(data, CONDITIONS, mixture)
+            mixed_experience(data, CONDITIONS, mixture, GAMMA)
 
 
 def test_joined_halves_are_one_trajectory() -> None:
@@ -72,7 +73,7 @@ def test_joined_halves_are_one_trajectory() -> None:
     """
     data = dataset([(4, 0, True), (3, 0, True), (4, 1, True), (6, 1, False)])
     there, back = ((*CONDITIONS[i].tolist(), *CONDITIONS[1 - i].tolist()) for i in (0, 1))
-    assert listed(mixed_experience(data, CONDITIONS[:2], "joined")) == [
+    assert listed(mixed_experience(data, CONDITIONS[:2], "joined", GAMMA)) == [
         (2, 3, there, 0, False),
         (3, 7, there, 0, False),
         (7, 8, there, 0, False),
@@ -93,16 +94,16 @@ def test_joined_halves_are_one_trajectory() -> None:
 
 def test_skills_that_nobody_shows_are_joined_to_none() -> None:
     data = dataset([(4, 0, True), (4, 1, True)])
-    joined = mixed_experience(data, CONDITIONS, "joined")
+    joined = mixed_experience(data, CONDITIONS, "joined", GAMMA)
     assert {skill_pairs(SKILLS)[pair] for pair in joined.condition_ids} == {(0, 1), (1, 0)}
     with pytest.raises(DataError, match="no skill"):
-        mixed_experience(dataset([(4, 0, True)]), CONDITIONS, "joined")
+        mixed_experience(dataset([(4, 0, True)]), CONDITIONS, "joined", GAMMA)
 
 
 @pytest.mark.parametrize("mixture", sorted(READINGS))
 def test_types_are_those_declared(mixture: Mixture) -> None:
     data = dataset([(5, 0, True), (4, 1, False), (3, 2, True)])
-    experience = mixed_experience(data, CONDITIONS, mixture)
+    experience = mixed_experience(data, CONDITIONS, mixture, GAMMA)
     dtypes = {
         "rows": np.int64,
         "condition_ids": np.int64,
@@ -121,7 +122,7 @@ def test_types_are_those_declared(mixture: Mixture) -> None:
 def test_a_single_skill_follows_itself(mixture: Mixture) -> None:
     """The missed episode is no example of either half."""
     data = dataset([(4, 0, True), (4, 0, False)])
-    experience = mixed_experience(data, CONDITIONS[:1], mixture)
+    experience = mixed_experience(data, CONDITIONS[:1], mixture, GAMMA)
     assert skill_pairs(1) == [(0, 0)]
     assert len(experience.conditions) == 1
     assert sorted(row for row, *_ in listed(experience)) == [0, 1, 2, 3]
