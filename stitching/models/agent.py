@@ -84,22 +84,23 @@ class Agent:
 
         Discrete policies turn noise (n, 1), uniform in [0, 1), into a sample by inverting the
         distribution function; Gaussian ones scale standard normal noise (n, action). The
-        temperature (above 0) divides logits, or multiplies the deviation, as in IQL's own code.
+        temperature of samples, above 0, divides logits or multiplies the deviation, as in IQL's
+        own code.
         """
         own = self._networks[condition]
         outputs = mlp(own.policy, self._inputs(states, condition)).squeeze(0)
         if self._actions.discrete:
-            return self._categorical(outputs / temperature, noise).numpy()
+            return self._categorical(outputs, noise, temperature).numpy()
         mean = outputs.tanh()
         if noise is not None:
             mean = mean + temperature * torch.from_numpy(noise) * own.log_std.exp()
         return mean.clamp(-1, 1).numpy()
 
-    def _categorical(self, logits: Tensor, noise: np.ndarray | None) -> Tensor:
+    def _categorical(self, logits: Tensor, noise: np.ndarray | None, temperature: float) -> Tensor:
         if noise is None:
             choice = logits.argmax(dim=-1)
         else:
-            below = logits.softmax(-1).cumsum(-1) < torch.from_numpy(noise)
+            below = (logits / temperature).softmax(-1).cumsum(-1) < torch.from_numpy(noise)
             # Rounding may leave the last sum just below 1.
             choice = below.sum(-1).clamp(max=self._actions.size - 1)
         return torch.nn.functional.one_hot(choice, self._actions.size).float()
