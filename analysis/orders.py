@@ -7,7 +7,7 @@ import pandas as pd
 from analysis.paper import paper_scores
 
 LONG_TASK = "microwave → kettle → bottom burner → light switch"
-"""What the paper's Single-Policy has seen, as rows of tables name it."""
+"""What the paper's Single-Policy has seen, as rows of tables name it; claims are of no other."""
 
 SAME, OTHER = "same order", "other orders"
 CLAIMED = {SAME: ("single-policy", "mb-stitch"), OTHER: ("mb-stitch", "single-policy")}
@@ -30,8 +30,13 @@ def by_order(cells: Cells) -> Cells:
     return {group: pd.concat(played) for group, played in parts.items()}
 
 
-def order_duels(groups: Cells, paper: str) -> list[tuple[str, str, str]]:
-    """(group, the paper's leader, the other), where the paper's table and this one have both."""
+def order_duels(groups: Cells, paper: str, long_task: str) -> list[tuple[str, str, str]]:
+    """(group, the paper's leader, the other), where the paper's table and this one have both.
+
+    long_task: what this run's Single-Policy has seen; none where it is not the paper's.
+    """
+    if long_task != LONG_TASK:
+        return []
     printed = {method for _, method in paper_scores(paper)}
     return [
         (group, *duel)

@@ -20,41 +20,47 @@ def pairs_section(run: Run, groups: pd.DataFrame | None) -> str:
     """Second skills by group of pairs and method; nothing where the data show no orders."""
     if groups is None:
         return ""
-    baseline = run.spec.methods.get(BASELINE, BASELINE)
+    baseline = run.spec.methods.get(BASELINE, "")
+    gain = [f"Gain over {baseline}"] if baseline else []
     lines = [
         [
             _unbroken(f"{row['group']} ({row['pairs']})"),
             run.spec.methods[row["method"]],
             f"{row['successes']:,} of {row['trials']:,}",
             _unbroken(f"{row['rate']:.3f} [{row['ci_low']:.3f}, {row['ci_high']:.3f}]"),
-            _gain(row, "gain"),
+            *([_gain(row, "gain")] if baseline else []),
             _unbroken(f"{row['both']:.3f} [{row['both_low']:.3f}, {row['both_high']:.3f}]"),
-            _gain(row, "both_gain"),
+            *([_gain(row, "both_gain")] if baseline else []),
         ]
         for row in groups.to_dict("records")
     ]
-    gain = f"Gain over {baseline}"
-    header = ["Pairs", "Method", "Second skill succeeds", "Rate", gain, "Both succeed", gain]
+    header = ["Pairs", "Method", "Second skill succeeds", "Rate", *gain, "Both succeed", *gain]
     return _note(
         "How often the second skill succeeds once the first has, and how often both do, over all "
         "episodes. A pair is in the data if its skills follow one another in some demonstration. "
-        "In rates and gains every pair weighs the same, and every seed, so a rate may differ a "
-        "little from successes over trials. "
-        f"Gains over {baseline} are paired by seed, pair and episode. {_shared_firsts(run)}"
+        f"In rates{' and gains' if baseline else ''} every pair weighs the same, and every seed, "
+        "so a rate may differ a little from successes over trials. "
+        f"{_shared_firsts(run, baseline)}"
         "95 % intervals are from resampling seeds, and within a seed each first skill's episodes, "
         "together for all pairs that begin with it; pairs are fixed. "
         f"{seed_note(int(groups['seeds'].min()))}"
     ) + html_table(header, lines)
 
 
-def _shared_firsts(run: Run) -> str:
-    """Whose first skills the second ones follow."""
+def _shared_firsts(run: Run, baseline: str) -> str:
+    """Whose first skills the second ones follow, and how gains over the baseline are paired."""
+    paired = f"Gains over {baseline} are paired by seed, pair and episode. " if baseline else ""
     if not run.spec.own_first_skill:
-        return "Methods share their first skills. "
-    return (
+        return f"{paired}Methods share their first skills. "
+    own = (
         "A method that stitches to first skills has its own, so it comes to other second skills "
-        "than another, and from other states: gains in the second skill are over those episodes "
-        "alone in which the first one succeeded under both methods, gains in both skills over all. "
+        "than another, and from other states"
+    )
+    if not baseline:
+        return f"{own}. "
+    return (
+        f"{paired}{own}: gains in the second skill are over those episodes alone in which the "
+        "first one succeeded under both methods, gains in both skills over all. "
     )
 
 

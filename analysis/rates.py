@@ -26,15 +26,18 @@ COUNTS = ["own_successes", "own_trials", "after_successes", "after_trials"]
 
 HEADER = [
     "Data", "Skill", "From its own starts", "After another skill", "Var(V)", "Var(T)", "β",
-    "β at equal prices",
+    "β · Var(V) / Var(T)",
 ]  # fmt: skip
 NOTE = (
-    "Successes of trials without stitching, with Wilson's 95 % interval. Own starts are those of "
-    "held-out demonstrations, whether these succeeded or not, played by the first seed's models "
-    "with all of a task's steps; after another skill means where that one succeeded, over all "
-    "seeds, with the steps that it left. Var(V) and Var(T) are the two variances of Eq. 2, means "
-    "over the skill's held-out demonstrations as a planner has them, first seed. The last column "
-    "is β · Var(V) / Var(T): the β with which Var(T) costs as much as Var(V) does at α = β."
+    "Successes of trials without stitching, with Wilson's 95 % interval. Own starts are where "
+    "held-out demonstrations of the skill begin (in Kitchen of those that succeeded, in robosuite "
+    "of all), played by the first seed's models for at most the steps of the longest task; after "
+    "another skill means where that one succeeded, over all seeds, with the steps that it left. A "
+    "skill's own limit, where the run has one, holds for both. Var(V) and Var(T) are the two "
+    "variances of Eq. 2, means over the skill's held-out demonstrations as a planner has them, "
+    "first seed. In place of β the last column would make the price of Var(T) as large as "
+    "β · Var(V), which is β / α times the other price, α · Var(V): both prices are equal where "
+    "α = β."
 )
 
 

@@ -67,6 +67,7 @@ class RunSpec:
     own_first_skill: frozenset[str] = frozenset()  # methods whose first skill nobody shares
     block_episodes: int = 1  # episodes that are played, and lost, together
     parts: tuple[PartEntry, ...] = ()  # the runs that this one was merged from, if it was
+    long_task: str = ""  # what Single-Policy learned, uncut; "" of a merged run
 
     @classmethod
     def from_dict(cls, spec: Mapping[str, Any]) -> RunSpec:
@@ -89,6 +90,7 @@ class RunSpec:
                     m["name"] for m in spec["methods"] if m.get("own_first_skill", False)
                 ),
                 block_episodes=spec.get("spec", {}).get("block_episodes", 1),
+                long_task=spec.get("spec", {}).get("single_policy", {}).get("task", ""),
                 parts=tuple(
                     PartEntry(
                         part["label"],

@@ -60,7 +60,7 @@ def build_table(episodes: pd.DataFrame, spec: RunSpec, entry: TableEntry) -> Tab
     """Gathers episodes into cells, and compares the methods within each row."""
     places = place_tasks(spec, entry)
     cells = _cells(episodes, places)
-    orders = by_order(cells)
+    orders, long_task = by_order(cells), spec.task_label(spec.long_task)
     scores = score_table(cells, entry)
     tasks_of_cell = Counter(zip(places["row"], places["column"], strict=True))
     labels = column_labels(spec)
@@ -73,7 +73,7 @@ def build_table(episodes: pd.DataFrame, spec: RunSpec, entry: TableEntry) -> Tab
         scores=scores,
         gains=_only(gains, gain_pairs),
         leads=_only(gains, lead_pairs),
-        orders=gain_table(orders, order_duels(orders, entry.paper), entry),
+        orders=gain_table(orders, order_duels(orders, entry.paper, long_task), entry),
         expected={
             cell: tasks * len(spec.seeds) * spec.episodes for cell, tasks in tasks_of_cell.items()
         },

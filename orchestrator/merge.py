@@ -231,10 +231,14 @@ def anatomy_of_part(study: Plain, naming: Naming) -> Plain:
 
 
 def diagnosis_of_part(study: Plain, naming: Naming) -> Plain:
-    """What is known of a part's models, of skills as they are called where all parts meet."""
+    """What is known of a part's models, of skills as they are called where all parts meet.
+
+    Parts that were diagnosed by an earlier version lack what it did not measure.
+    """
     return study | {
         name: {naming.skill(skill): found for skill, found in study[name].items()}
         for name in ("values", "prices", "competence")
+        if name in study
     }
 
 

@@ -60,8 +60,8 @@ class SweepSpec:
     trials: int = 40  # the grid: all its points
     batch: int = 4  # trials asked at once; part of what makes the study
     startup: int = 10  # random trials before TPE begins
-    enqueued: tuple[dict[str, Value], ...] = ()  # tried first, in this order; may grow
-    base_first: bool = True  # the base's own setting is the first trial
+    enqueued: tuple[dict[str, Value], ...] = ()  # the first trials, in this order; may grow
+    base_first: bool = True  # the base's own setting is the first trial, where none is enqueued
     seed: int = 0  # of the sampler
     objectives: tuple[str, ...] = ("gain",)  # metrics of one of `sweeps.questions`
     constraints: dict[str, float] = field(default_factory=dict)  # metric → most it may be
@@ -113,10 +113,10 @@ def check_sweep(sweep: SweepSpec) -> None:
     if sweep.tables and any(not path.startswith("mb_stitch.") for path in sweep.space):
         raise UsageError(f"{where}, tables: a table compares methods, not models: search mb_stitch")
     base = base_spec(sweep)
+    check_space(sweep.space, base, sweep.question.searched, f"{where}, space")
     if sweep.enqueued and sweep.sampler == "grid":
         raise UsageError(f"{where}, enqueued: a grid has its own order")
     check_enqueued(sweep.enqueued, sweep.space, f"{where}, enqueued")
-    check_space(sweep.space, base, sweep.question.searched, f"{where}, space")
     if sweep.budget < 1:
         raise UsageError(f"{where}, space: a grid without points")
     searched, held_out = split_tasks(sweep, base)

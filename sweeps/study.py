@@ -25,11 +25,11 @@ from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock
 from optuna.study import StudyDirection
 from optuna.trial import FrozenTrial, TrialState, create_trial
 
-from orchestrator.errors import StorageError
+from orchestrator.errors import ChangedError, StorageError
 from orchestrator.store import storage_errors
 from stitching.streams import stream
 from sweeps.questions import METRICS
-from sweeps.space import Fields, current
+from sweeps.space import Fields, current, describe
 from sweeps.spec import SweepSpec, base_spec
 
 RESULT = "result"  # user attribute: a trial's metrics, there before any of its batch is told
@@ -79,6 +79,7 @@ class SweepStudy:
         backend = JournalFileBackend(str(self.path), lock)
         with storage_errors(self.path):
             self.study = _open(JournalStorage(backend), sweep)
+        self._check_enqueued()
 
     @property
     def trials(self) -> list[FrozenTrial]:
@@ -130,6 +131,16 @@ class SweepStudy:
         sign = -1 if METRICS[self.sweep.objectives[0]].maximised else 1
         kept = [t for t in self.finished if feasible(t) and not t.user_attrs[RESULT]["pruned"]]
         return sorted(kept, key=lambda trial: (sign * trial.values[0], trial.number))
+
+    def _check_enqueued(self) -> None:
+        """ChangedError for a setting that would be passed over: its number has another already."""
+        for trial, setting in zip(self.trials, self.sweep.enqueued, strict=False):
+            if (before := self.fields(trial)) != setting:
+                raise ChangedError(
+                    f"{self.path}: enqueued, {trial.number}: trial {trial.number} was asked with "
+                    f"{describe(before)}; enqueue others behind the {len(self.trials)} trials that "
+                    "there are, or choose another --out"
+                )
 
     def _ask(self, number: int) -> None:
         """Add one trial to the journal, whole."""

@@ -84,7 +84,8 @@ class Agent:
 
         Discrete policies turn noise (n, 1), uniform in [0, 1), into a sample by inverting the
         distribution function; Gaussian ones scale standard normal noise (n, action). The
-        temperature (above 0) divides logits, or multiplies the deviation, as in IQL's own code.
+        temperature of samples, above 0, divides logits or multiplies the deviation, as in IQL's
+        own code.
         """
         own = self._networks[condition]
         outputs = mlp(own.policy, self._inputs(states, condition)).squeeze(0)

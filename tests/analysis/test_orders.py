@@ -6,7 +6,7 @@ from analysis.orders import OTHER, SAME, order_of
 from analysis.paper import paper_table
 from analysis.run import RunSpec
 from analysis.tables import build_table
-from analysis.verdicts import HOLDS, UNDECIDED, claims
+from analysis.verdicts import FAILS, HOLDS, claims
 
 TASKS = {row.replace(" → ", ">"): row for row in dict.fromkeys(paper_table("4")["row"])}
 
@@ -19,8 +19,10 @@ def test_the_paper_s_rows_by_order() -> None:
     assert [order_of(row) for row in TASKS.values()].count(OTHER) == 10
 
 
-@pytest.fixture
-def spec() -> RunSpec:
+LONG_TASK = "microwave>kettle>bottom burner>light switch"
+
+
+def spec_of(long_task: str) -> RunSpec:
     return RunSpec.from_dict(
         {
             "name": "table4",
@@ -36,8 +38,14 @@ def spec() -> RunSpec:
             "tasks": list(TASKS),
             "step_limits": {"1": 120, "2": 250, "3": 360, "4": 480},
             "tables": [{"id": "table4", "paper": "4", "rows": "task", "title": ""}],
+            "spec": {"single_policy": {"task": long_task}},
         }
     )
+
+
+@pytest.fixture
+def spec() -> RunSpec:
+    return spec_of(LONG_TASK)
 
 
 def as_printed(spec: RunSpec, order: str) -> pd.DataFrame:
@@ -67,4 +75,12 @@ def test_claims_of_table_4(spec: RunSpec) -> None:
 
 def test_claims_fail_where_the_other_leads(spec: RunSpec) -> None:
     table = build_table(as_printed(spec, OTHER), spec, spec.tables[0])
-    assert not {HOLDS, UNDECIDED} & {claim.verdict for claim in claims(table)}
+    assert [claim.verdict for claim in claims(table)] == [FAILS] * 15
+
+
+@pytest.mark.parametrize("long_task", ["microwave>bottom burner>kettle>light switch", ""])
+def test_orders_are_claimed_of_the_paper_s_long_task_alone(long_task: str) -> None:
+    other = spec_of(long_task)
+    table = build_table(as_printed(other, SAME), other, other.tables[0])
+    assert table.orders.empty
+    assert len(claims(table)) == 13, "of the rows, as in any table"

@@ -37,6 +37,17 @@ def test_the_skills_and_the_dynamics_are_table_2s(scale: Scale) -> None:
     assert ours.spec.mb_stitch == theirs.spec.mb_stitch
 
 
+@pytest.mark.parametrize("scale", ["quick", "standard"])
+def test_the_stitched_blocks_are_table_2s(scale: Scale) -> None:
+    """They are played once for both tables."""
+    ours, theirs = (
+        make_plan(replace(load_spec(name, scale), methods=("mb-stitch",))).tasks
+        for name in ("table4", "table2")
+    )
+    found = {place: theirs[place].key for place in ours}
+    assert {place: task.key for place, task in ours.items()} == found
+
+
 def test_its_nodes_are_its_own_from_the_first_skill_on(spec: Spec, plan: Plan) -> None:
     own = [node for node in plan.nodes if node.method == METHOD]
     assert {node.prefix for node in own} == {

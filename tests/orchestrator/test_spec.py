@@ -3,20 +3,21 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
 from orchestrator.errors import UsageError
 from orchestrator.methods import MBStitchConfig, method_label
-from orchestrator.spec import differences, load_spec, packaged_specs, spec_from_plain
+from orchestrator.spec import Scale, differences, load_spec, packaged_specs, spec_from_plain
 from orchestrator.structure import to_plain
 from orchestrator.suite import Suite, load_asked
 
 
 @pytest.mark.parametrize("name", packaged_specs())
-@pytest.mark.parametrize("scale", ["smoke", "quick", "paper"])
-def test_packaged_specs_load_at_every_scale(name: str, scale: str) -> None:
-    asked = load_asked(name, scale)  # type: ignore[arg-type]
+@pytest.mark.parametrize("scale", get_args(Scale))
+def test_packaged_specs_load_at_every_scale(name: str, scale: Scale) -> None:
+    asked = load_asked(name, scale)
     assert asked.scale == scale
     assert asked.tables
     for spec in [part.spec for part in asked.parts] if isinstance(asked, Suite) else [asked]:

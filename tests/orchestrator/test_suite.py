@@ -221,6 +221,9 @@ def test_what_is_known_of_models_is_kept_by_part(tmp_path: Path) -> None:
     renamed = diagnosis_of_part(study, Naming(suite, suite.parts[0]))
     assert renamed["predictions"] == {"1": {}}
     assert all(renamed[name] == {"short:g0": 1} for name in ("values", "prices", "competence"))
+    earlier = {name: found for name, found in study.items() if name != "prices"}
+    del renamed["prices"]
+    assert diagnosis_of_part(earlier, Naming(suite, suite.parts[0])) == renamed
 
 
 def test_every_part_is_shown_under_the_names_of_the_whole(done: Path, tmp_path: Path) -> None:

@@ -748,6 +748,30 @@ def test_policy_and_values_are_asked_about_the_skill_being_played() -> None:
         np.testing.assert_allclose([outcome.value_start, outcome.value_end], row, rtol=1e-5)
 
 
+def test_the_temperature_lies_between_the_mode_and_the_learned_policy() -> None:
+    """Right is the likeliest move, by 0.71 at temperature 1 and by 0.33 at 5."""
+    agent = made_by_hand(
+        np.zeros((1, FLOOR.observation_size + 2, 1)),
+        np.zeros((1, FLOOR.observation_size + 2, 4)),
+        2 * np.eye(4)[RIGHT],
+    )
+
+    def to_the_right(temperature: float) -> float:
+        """The share of first moves that go there, of 200 episodes."""
+        config = RolloutConfig(temperature=temperature)
+        ends = on_the_floor(agent, NoStitch(), [(6, 6)] * 200, budget=1, config=config)[0].snapshots
+        return float((ends[:, 1] == 7).mean())
+
+    assert to_the_right(0.0) == to_the_right(1e-3) == 1
+    assert to_the_right(1.0) == pytest.approx(0.711, abs=0.1)
+    assert to_the_right(5.0) == pytest.approx(0.332, abs=0.1)
+
+
+def test_a_negative_temperature_is_refused() -> None:
+    with pytest.raises(ValueError, match="temperature: must not be negative"):
+        RolloutConfig(temperature=-0.1)
+
+
 @pytest.mark.parametrize(("limit", "success"), [(5, False), (6, True), (0, True)])
 def test_a_skill_has_its_own_limit_stitching_included(limit: int, success: bool) -> None:
     signs = {10: [DOWN], 11: [DOWN]}

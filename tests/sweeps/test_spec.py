@@ -1,7 +1,7 @@
 """What can be asked for, and how what cannot is refused."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 
@@ -10,7 +10,7 @@ from analysis.rows import place_tasks
 from analysis.run import RunSpec
 from orchestrator.errors import UsageError
 from orchestrator.rundir import describe
-from orchestrator.spec import TableSpec, load_spec
+from orchestrator.spec import Scale, TableSpec, load_spec
 from sweeps.space import Dimension, replaced
 from sweeps.spec import (
     Confirm,
@@ -24,12 +24,15 @@ from sweeps.table import table_spec
 from tests.sweeps.tiny import tiny_sweep
 
 ALPHA = "mb_stitch.alpha"
+OWN = {ALPHA: 1.0, "mb_stitch.beta": 1.0, "mb_stitch.random_shooting.population": 4}
+"""A setting within the tiny sweep's space."""
 
 
-@pytest.mark.parametrize("scale", ["smoke", "quick", "paper"])
+@pytest.mark.parametrize("scale", get_args(Scale))
 @pytest.mark.parametrize("name", packaged_sweeps())
-def test_packaged_sweeps_can_be_asked_for(name: str, scale: Any) -> None:
-    assert load_sweep(name, scale).name == name
+def test_packaged_sweeps_can_be_asked_for(name: str, scale: Scale) -> None:
+    sweep = load_sweep(name, scale)
+    assert (sweep.name, sweep.scale) == (name, scale)
 
 
 def test_table9_is_the_papers_grid() -> None:
@@ -98,6 +101,14 @@ def test_fields_that_do_not_go_together_are_found_before_anything_runs() -> None
         ({"settings": {"sedes": 2}}, "unknown field 'sedes'"),
         ({"sampler": "grid"}, "a grid needs choices"),
         ({"space": {}}, "nothing to search"),
+        (
+            {"enqueued": ({ALPHA: 1.0},)},
+            "enqueued, 0: expected a value for each of mb_stitch.alpha",
+        ),
+        ({"enqueued": (OWN, OWN | {"seed": 1})}, "enqueued, 1: expected a value for each of"),
+        ({"enqueued": (OWN, OWN | {ALPHA: 99.0})}, "1, mb_stitch.alpha: 99.0 is outside its range"),
+        ({"enqueued": (OWN | {ALPHA: "much"},)}, "'much' is outside its range"),
+        ({"sampler": "grid", "enqueued": (OWN,)}, "enqueued: a grid has its own order"),
     ],
 )
 def test_what_cannot_be_carried_out_is_refused(changes: dict[str, Any], message: str) -> None:

@@ -75,12 +75,24 @@ def test_the_mode_of_a_gaussian_policy_is_its_mean(condition: int) -> None:
     np.testing.assert_allclose(actions, expected, atol=1e-5)
 
 
-def test_noise_picks_the_action_in_whose_share_it_falls() -> None:
+@SPACES
+def test_the_mode_has_no_temperature(space: ActionSpace) -> None:
+    agent, seen = Agent(weights(), CONDITIONS, space), torch.from_numpy(states())
+    for temperature in (0.0, 0.5):
+        np.testing.assert_array_equal(
+            agent.act(seen, 0, None, temperature), agent.act(seen, 0, None)
+        )
+
+
+@pytest.mark.parametrize("temperature", [0.5, 1.0, 3.0])
+def test_noise_picks_the_action_in_whose_share_it_falls(temperature: float) -> None:
+    """Shares are the softmax of logits over the temperature: at 1 they are as learned."""
     agent = Agent(weights(), CONDITIONS, MOVES)
     noise = np.linspace(0, 1, 400, endpoint=False, dtype=np.float32)[:, None]
     for state in states():
-        sampled = agent.act(torch.from_numpy(state).expand(400, -1), 0, noise).argmax(axis=1)
-        ends = np.cumsum(softmax(plain(weights(), "policy", state, 0)[0]))
+        alike = torch.from_numpy(state).expand(400, -1)
+        sampled = agent.act(alike, 0, noise, temperature).argmax(axis=1)
+        ends = np.cumsum(softmax(plain(weights(), "policy", state, 0)[0] / temperature))
         clear = np.abs(noise - ends).min(axis=1) > 1e-5
         assert clear.sum() > 390
         np.testing.assert_array_equal(
@@ -107,16 +119,18 @@ def test_any_noise_gives_one_action(noise: float) -> None:
     assert sampled.max() == 1
 
 
-def test_gaussian_samples_are_clipped_to_the_box() -> None:
+@pytest.mark.parametrize("temperature", [0.25, 1.0])
+def test_gaussian_samples_are_clipped_to_the_box(temperature: float) -> None:
+    """Their deviation is the learned one times the temperature."""
     draws = 5000
     noise = stream("noise").standard_normal((draws, 4), dtype=np.float32)
     state = states()[2]
     sampled = Agent(weights(), CONDITIONS, ARM).act(
-        torch.from_numpy(state).expand(draws, -1), 0, noise
+        torch.from_numpy(state).expand(draws, -1), 0, noise, temperature
     )
     mean = np.tanh(plain(weights(), "policy", state, 0)[0])
     std = np.exp(np.clip(LOG_STD.astype(np.float64), *LOG_STD_RANGE))
-    np.testing.assert_allclose(sampled, np.clip(mean + noise * std, -1, 1), atol=1e-5)
+    np.testing.assert_allclose(sampled, np.clip(mean + temperature * noise * std, -1, 1), atol=1e-5)
     assert np.abs(sampled).max() == 1
 
 
