@@ -14,7 +14,7 @@ from stitching.models.agent import Agent
 class Still:
     """A policy that goes to the middle of the workspace, and values that say nothing."""
 
-    def act(self, states: torch.Tensor, condition: int, noise: None) -> np.ndarray:
+    def act(self, states: torch.Tensor, *asked: Any) -> np.ndarray:
         return np.zeros((len(states), DOOR.actions.size), dtype=np.float32)
 
     def values(self, states: torch.Tensor, condition: int) -> torch.Tensor:

@@ -33,7 +33,7 @@ SPACE = {QUALITY: Dimension(choices=(0.9, BEST, 0.3)), "data.wait": Dimension(ch
 
 
 def data_sweep(**changes: Any) -> SweepSpec:
-    return replace(load_sweep("kitchen-data", "smoke"), **changes)
+    return replace(load_sweep("kitchen-data", "smoke"), **{"enqueued": (), **changes})
 
 
 def made_up(self: Arena, spec: Spec, seeds: Iterable[int] | None = None) -> Played:
@@ -132,7 +132,8 @@ def test_the_plan_says_what_a_trial_trains(tmp_path: Path) -> None:
     [
         ({"tasks": ("kettle>microwave",)}, "a misfit is of all pairs of Kitchen's skills"),
         ({"held_out_share": 0.2}, "hold nothing out"),
-        ({"base": "table1", "space": {"data.episodes": Dimension(low=1, high=9, integer=True)}},
+        ({"base": "table1", "settings": {"lengths": [2]},
+          "space": {"data.episodes": Dimension(low=1, high=9, integer=True)}},
          "a misfit is of all pairs of Kitchen's skills"),
         ({"space": {"mb_stitch.alpha": Dimension(low=1, high=2)}}, "begin with one of data, agent"),
         ({"objectives": ("misfit", "gain")}, "misfit and gain come from different episodes"),
