@@ -16,6 +16,7 @@ import pytest
 from orchestrator.errors import ChangedError, LockedError, StorageError, UsageError
 from orchestrator.rundir import RunDirectory, default_out, describe
 from orchestrator.spec import Spec
+from stitching.rollout import RolloutConfig
 from tests.orchestrator.tiny import Place
 
 
@@ -145,7 +146,13 @@ def test_what_a_reader_finds_in_the_spec(spec: Spec) -> None:
     assert text["skills"] == ["g0", "g1", "g2", "g3"]
     assert text["tasks"] == list(spec.tasks)
     assert text["seeds"] == [0, 1]
-    assert text["methods"][3] == {"name": "mb-stitch", "label": "MB-Stitch"}
+    assert text["methods"][3] == {
+        "name": "mb-stitch", "label": "MB-Stitch", "own_first_skill": False
+    }  # fmt: skip
+    first = json.loads(
+        json.dumps(describe(replace(spec, rollout=RolloutConfig(first_stitch=True))))
+    )
+    assert [method["own_first_skill"] for method in first["methods"]] == [False, True, False, True]
     assert text["step_limits"] == {"2": 20, "3": 30}
 
 
