@@ -43,10 +43,10 @@ def spec() -> Spec:
         data=KitchenDataConfig(episodes=12, held_out=1, quality=0.9),  # steady hands
         agent=skills,
         dynamics=DynamicsConfig(updates=300, width=32, members=2, activation="elu"),
-        random_stitch=replace(spec.random_stitch, limit=3),
+        random_stitch=replace(spec.random_stitch, limit=1),
         mf_stitch=replace(spec.mf_stitch, limit=3, training=replace(skills, updates=100)),
         single_policy=SinglePolicyConfig(">".join(ORDER), episodes=12, training=skills),
-        mb_stitch=replace(spec.mb_stitch, limit=3, cem=CEM(population=16, elites=4, iterations=10)),
+        mb_stitch=replace(spec.mb_stitch, limit=1, cem=CEM(population=16, elites=4, iterations=10)),
     )
 
 
