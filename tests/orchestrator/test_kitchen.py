@@ -1,6 +1,7 @@
 """A small Kitchen reproduction from data to report, with skills that really work."""
 
 import json
+import shutil
 from dataclasses import replace
 from itertools import pairwise
 
@@ -39,25 +40,39 @@ def spec() -> Spec:
         tasks=(">".join(ORDER[:3]), ">".join(ORDER), ">".join(ORDER[2:])),
         episodes=4,
         block_episodes=4,
-        rollout=replace(spec.rollout, temperature=0.0),
+        rollout=replace(spec.rollout, temperature=0.0, first_stitch=False),
         data=KitchenDataConfig(episodes=12, held_out=1, quality=0.9),  # steady hands
         agent=skills,
         dynamics=DynamicsConfig(updates=300, width=32, members=2, activation="elu"),
-        random_stitch=replace(spec.random_stitch, limit=1),
+        random_stitch=replace(spec.random_stitch, limit=3),
         mf_stitch=replace(spec.mf_stitch, limit=3, training=replace(skills, updates=100)),
         single_policy=SinglePolicyConfig(">".join(ORDER), episodes=12, training=skills),
-        mb_stitch=replace(spec.mb_stitch, limit=1, cem=CEM(population=16, elites=4, iterations=10)),
+        mb_stitch=replace(spec.mb_stitch, limit=3, cem=CEM(population=16, elites=4, iterations=10)),
     )
+
+
+def carried_out(spec: Spec, place: Place) -> tuple[Plan, Place]:
+    with pytest.MonkeyPatch.context() as patch:
+        for module in ("orchestrator.kits", "stitching.data.kitchen.demonstrations"):
+            patch.setattr(f"{module}.orders", lambda config: (ORDER,))
+        place.carry_out(spec)
+        return make_plan(spec), place
 
 
 @pytest.fixture(scope="module")
 def played(spec: Spec, tmp_path_factory: pytest.TempPathFactory) -> tuple[Plan, Place]:
-    with pytest.MonkeyPatch.context() as patch:
-        for module in ("orchestrator.kits", "stitching.data.kitchen.demonstrations"):
-            patch.setattr(f"{module}.orders", lambda config: (ORDER,))
-        place = Place(tmp_path_factory.mktemp("kitchen"))
-        place.carry_out(spec)
-        return make_plan(spec), place
+    return carried_out(spec, Place(tmp_path_factory.mktemp("kitchen")))
+
+
+@pytest.fixture(scope="module")
+def stitched_first(
+    spec: Spec, played: tuple[Plan, Place], tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Plan, Place]:
+    """Two skills by the same models, stitched to from the first one on."""
+    place = Place(tmp_path_factory.mktemp("first"))
+    shutil.copytree(played[1].store_root, place.store_root)
+    rollout = replace(spec.rollout, first_stitch=True)
+    return carried_out(replace(spec, tasks=(">".join(ORDER[:2]),), rollout=rollout), place)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -84,8 +99,20 @@ def test_the_run_tells_of_pairs_and_models(played: tuple[Plan, Place]) -> None:
         assert (place.out / "report" / f"{table}.md").is_file()
 
 
-def test_stitches_are_taken_apart(played: tuple[Plan, Place]) -> None:
-    plan, place = played
+@pytest.mark.parametrize("method", METHODS)
+def test_first_stitches_played_without_the_tree(
+    stitched_first: tuple[Plan, Place], method: str
+) -> None:
+    plan, place = stitched_first
+    (task,) = plan.spec.all_tasks
+    alone = Alone(plan, place, 0, method, task, chunk=0)
+    assert alone.depth_of_the_same_bytes() >= 1
+    stitched = alone.recorded()[0].arrays["stitch_steps"].any()
+    assert stitched == (method in ("random-stitch", "mb-stitch"))
+
+
+def test_stitches_are_taken_apart(stitched_first: tuple[Plan, Place]) -> None:
+    plan, place = stitched_first
     anatomy = json.loads((place.out / "anatomy.json").read_text())
     taken = [(pair["first"], pair["second"]) for pair in anatomy["pairs"]]
     pairs = list(dict.fromkeys(p for task in plan.spec.all_tasks for p in pairwise(task)))
