@@ -10,15 +10,20 @@ from analysis.writers import Record, gain_texts, paper_text, short_of
 
 def html_table(header: list[str], rows: list[list[str]]) -> str:
     """A plain table of text; the first cell of each line heads it."""
+    return table_of(header, [[head, *map(escape, cells)] for head, *cells in rows])
+
+
+def table_of(header: list[str], rows: list[list[str]], attributes: str = "") -> str:
+    """A table whose header and first cells are text, and whose other cells are HTML."""
     heads = "".join(f'<th scope="col">{escape(title)}</th>' for title in header)
     body = "".join(
         f'<tr><th scope="row">{escape(head)}</th>'
-        + "".join(f"<td>{escape(cell)}</td>" for cell in cells)
+        + "".join(f"<td>{cell}</td>" for cell in cells)
         + "</tr>"
         for head, *cells in rows
     )
     return (
-        f'<div class="scroll" tabindex="0"><table><thead><tr>{heads}</tr></thead>'
+        f'<div class="scroll" tabindex="0"><table{attributes}><thead><tr>{heads}</tr></thead>'
         f"<tbody>{body}</tbody></table></div>"
     )
 

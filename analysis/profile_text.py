@@ -7,6 +7,7 @@ from html import escape
 import pandas as pd
 
 from analysis.implied import FIRST, MEAN, SECOND
+from analysis.page_tables import table_of
 from analysis.profile import MARGIN
 from analysis.run import RunSpec
 from analysis.verdicts import AGREES, HIGHER, LOWER
@@ -50,17 +51,7 @@ def profile_section(profile: pd.DataFrame | None, spec: RunSpec) -> str:
     html = "".join(f'<p class="note">{escape(note)}</p>' for note in notes)
     for kind, heading in HEADINGS.items():
         header, rows = _matrix(profile, spec, kind, heading, _cell_html)
-        heads = "".join(f'<th scope="col">{escape(title)}</th>' for title in header)
-        body = "".join(
-            f'<tr><th scope="row">{escape(head)}</th>'
-            + "".join(f"<td>{cell}</td>" for cell in cells)
-            + "</tr>"
-            for head, *cells in rows
-        )
-        html += (
-            f'<div class="scroll" tabindex="0"><table class="scores"><thead><tr>{heads}</tr>'
-            f"</thead><tbody>{body}</tbody></table></div>"
-        )
+        html += table_of(header, rows, ' class="scores"')
     return html
 
 

@@ -70,8 +70,7 @@ def test_skill_experience(episodes: list[tuple[int, int, bool]]) -> None:
             skill_experience(data, CONDITIONS)
 
 
-def test_types_are_those_declared() -> None:
-    experience = skill_experience(dataset([(5, 0, True), (4, 1, False), (3, 2, True)]), CONDITIONS)
+def check_types(experience: Experience) -> None:
     dtypes = {
         "rows": np.int64,
         "condition_ids": np.int64,
@@ -82,6 +81,11 @@ def test_types_are_those_declared() -> None:
     assert set(dtypes) == {field.name for field in fields(Experience)} - {"data"}
     for name, dtype in dtypes.items():
         assert getattr(experience, name).dtype == dtype, name
+
+
+def test_types_are_those_declared() -> None:
+    data = dataset([(5, 0, True), (4, 1, False), (3, 2, True)])
+    check_types(skill_experience(data, CONDITIONS))
 
 
 def test_the_data_are_referred_to_not_copied() -> None:

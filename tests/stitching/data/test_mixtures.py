@@ -1,7 +1,5 @@
 """MF-Stitch's mixed data, each reading against its definition written out row by row."""
 
-from dataclasses import fields
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,7 +8,14 @@ from hypothesis import strategies as st
 from stitching.data.experience import Experience
 from stitching.data.mixtures import READINGS, Mixture, mixed_experience, skill_pairs
 from stitching.data.transitions import DataError, Transitions
-from tests.stitching.data.test_experience import CONDITIONS, SKILLS, dataset, episode, spans
+from tests.stitching.data.test_experience import (
+    CONDITIONS,
+    SKILLS,
+    check_types,
+    dataset,
+    episode,
+    spans,
+)
 
 Row = tuple[float, float, tuple[float, ...], float, bool]  # from, to, condition, reward, terminal
 GAMMA = 0.95
@@ -104,16 +109,7 @@ def test_skills_that_nobody_shows_are_joined_to_none() -> None:
 def test_types_are_those_declared(mixture: Mixture) -> None:
     data = dataset([(5, 0, True), (4, 1, False), (3, 2, True)])
     experience = mixed_experience(data, CONDITIONS, mixture, GAMMA)
-    dtypes = {
-        "rows": np.int64,
-        "condition_ids": np.int64,
-        "conditions": np.float32,
-        "rewards": np.float32,
-        "terminals": np.bool_,
-    }
-    assert set(dtypes) == {field.name for field in fields(Experience)} - {"data"}
-    for name, dtype in dtypes.items():
-        assert getattr(experience, name).dtype == dtype, name
+    check_types(experience)
     for name, column in experience.data.columns().items():
         assert column.dtype == data.columns()[name].dtype, name
 
