@@ -49,12 +49,18 @@ def test_table2_is_the_papers_protocol() -> None:
     assert spec.dynamics.activation == "elu"
 
 
-def test_kitchen_data_are_collected_an_order_at_a_time(plan: Plan) -> None:
+def test_kitchen_data_are_collected_an_order_at_a_time(spec: Spec) -> None:
+    plan = make_plan(replace(spec, data=replace(spec.data, first_weights={})))
     assert len(plan.datasets) == 24
     agent = plan.recipes[plan.agents[0]]
     assert agent.inputs == plan.datasets == plan.recipes[plan.dynamics[0]].inputs
     orders = [tuple(plan.recipes[key].params["order"]) for key in plan.datasets.values()]
     assert len(set(orders)) == 24
+
+
+def test_orders_without_demonstrations_have_no_dataset(plan: Plan) -> None:
+    firsts = [plan.recipes[key].params["order"][0] for key in plan.datasets.values()]
+    assert sorted(firsts) == ["bottom burner"] * 2 + ["microwave"] * 14  # none begins with kettle
 
 
 def test_nothing_is_trained_on_held_out_data(plan: Plan) -> None:

@@ -73,7 +73,7 @@ def test_its_demonstrations_teach_it_and_nothing_else(plan: Plan) -> None:
     assert list(policy.inputs.values()) == [plan.datasets[role]]
     params = plan.recipes[plan.datasets[role]].params
     assert ">".join(params["order"]) == plan.spec.single_policy.task
-    skills = plan.recipes[plan.datasets["demonstrations-kettle-top-hinge-slide"]].params
+    skills = plan.recipes[plan.datasets["demonstrations-microwave-top-hinge-slide"]].params
     assert params["config"] == skills["config"] | {"episodes": plan.spec.single_policy.episodes}
     others = {*plan.agents.values(), *plan.dynamics.values()}
     assert not any(plan.datasets[role] in plan.recipes[key].inputs.values() for key in others)

@@ -52,7 +52,7 @@ class KitchenDataConfig:
     held_out: int = 8  # more of each order, to judge models by
     quality: float = 0.9  # of the hand: from 1, a steady expert, down to 0
     qualities: dict[str, float] = field(default_factory=dict)  # skill → another quality for it
-    wait: int = 0  # steps, at most, for which a demonstration stands still first; people: some 8
+    ease: int = 0  # steps in which a demonstration's first movement gathers speed; people: some 15
     elsewhere: float = 0.0  # share of later skills that begin at a free pose, not where one ended
     skill_steps: int = 160  # after which a skill counts as missed and the demonstration ends
     return_home: bool = False  # to the start posture before another skill; people do not
@@ -66,8 +66,8 @@ class KitchenDataConfig:
         for name, share in {"elsewhere": self.elsewhere, **self.qualities}.items():
             if not 0 <= share <= 1:
                 raise ValueError(f"{name}: must lie in [0, 1]")
-        if any(weight < 0 for weight in self.first_weights.values()) or self.wait < 0:
-            raise ValueError("first_weights and wait: must not be negative")
+        if any(weight < 0 for weight in self.first_weights.values()) or self.ease < 0:
+            raise ValueError("first_weights and ease: must not be negative")
 
     def demonstrations(self, order: Order) -> int:
         """How many demonstrations of an order a dataset holds."""
@@ -83,13 +83,12 @@ class Demonstrator:
 
     def __init__(self, order: Order, config: KitchenDataConfig, rng: np.random.Generator) -> None:
         self._todo, self._config, self._rng = list(order), config, rng
-        self._style = config.style(order[0])
+        self._style: Style  # of the present skill
         self._done = np.zeros(len(SKILLS), dtype=bool)
         self._last: Program | None = None
         self._moves: Iterator[np.ndarray] | None = None
         self._relocation: Iterator[np.ndarray] = iter(())
-        self._waiting = int(rng.integers(config.wait // 2, config.wait + 1)) if config.wait else 0
-        self._steps = 0
+        self._steps = self._acted = 0  # of the present skill, and of the whole demonstration
         self.relocating = False  # whether the last action belongs to no skill
 
     def act(self, arm: Arm, achieved: np.ndarray) -> np.ndarray | None:
@@ -117,12 +116,13 @@ class Demonstrator:
             )
         action = next(self._relocation, None)
         self.relocating = action is not None
-        if self._waiting:
-            self._waiting -= 1
-            action = arm.bend(np.zeros_like(HOME), GRIP_OPEN)
-        elif action is None:
+        if action is None:
             action = next(self._moves)
             self._steps += 1
+        self._acted += 1
+        if self._acted < self._config.ease:
+            still = arm.bend(np.zeros_like(HOME), GRIP_OPEN)
+            action = still + self._acted / self._config.ease * (action - still)
         noise = self._style.noise * self._rng.standard_normal(JOINTS)
         return np.clip(action + noise, -1, 1).astype(np.float32)
 

@@ -29,7 +29,7 @@ from sweeps.winner import with_winner
 from tests.sweeps.tiny import settings
 
 QUALITY, BEST = "data.quality", 0.6
-SPACE = {QUALITY: Dimension(choices=(0.9, BEST, 0.3)), "data.wait": Dimension(choices=(0, 8))}
+SPACE = {QUALITY: Dimension(choices=(0.9, BEST, 0.3)), "data.ease": Dimension(choices=(0, 8))}
 
 
 def data_sweep(**changes: Any) -> SweepSpec:
@@ -81,7 +81,7 @@ def settings_of(episodes: int) -> dict[str, Any]:
 def test_the_setting_nearest_to_the_paper_wins(found: Path) -> None:
     winner = json.loads((found / "winner.json").read_text())
     trials = json.loads((found / "trials.json").read_text())
-    assert winner["fields"] == {QUALITY: BEST, "data.wait": 0}
+    assert winner["fields"] == {QUALITY: BEST, "data.ease": 0}
     assert len(trials) == 6
     assert winner["search"]["misfit"] == min(trial["misfit"] for trial in trials)
     for trial in trials:
