@@ -28,7 +28,7 @@ from sweeps.sweep import carry_out
 from sweeps.winner import with_winner
 from tests.sweeps.tiny import settings
 
-QUALITY, BEST = "data.quality", 0.6
+QUALITY, BEST = "data.quality", 0.7
 SPACE = {QUALITY: Dimension(choices=(0.9, BEST, 0.3)), "data.ease": Dimension(choices=(0, 8))}
 
 
@@ -124,7 +124,7 @@ def test_nothing_is_planned_that_neither_method_needs() -> None:
 def test_the_plan_says_what_a_trial_trains(tmp_path: Path) -> None:
     head, trial = plan_lines(data_sweep(), tmp_path)
     assert "2 trials × 42 tasks" in head
-    assert "at most 98 blocks; the base's own setting has 0 of 25 artifacts and 0 of 98" in trial
+    assert "at most 98 blocks; the base's own setting has 0 of 17 artifacts and 0 of 98" in trial
 
 
 @pytest.mark.parametrize(
