@@ -19,6 +19,7 @@ from stitching.models.iql import IQLConfig
 from stitching.planning.cem import CEM
 from stitching.planning.objective import Norm, Price
 from stitching.planning.random_shooting import RandomShooting
+from stitching.reach_stitch import ReachStitch
 from stitching.rollout import RolloutConfig
 from stitching.stitchers import MBStitch, MFStitch, NoStitch, RandomStitch, Stitcher
 
@@ -41,7 +42,21 @@ class MFStitchConfig:
 
 
 @dataclass(frozen=True)
-class MBStitchConfig:
+class PlanningConfig:
+    """How a method that plans searches."""
+
+    planner: Literal["random-shooting", "cem"] = "cem"
+    random_shooting: RandomShooting = RandomShooting()
+    cem: CEM = CEM()
+
+    @property
+    def chosen(self) -> CEM | RandomShooting:
+        """The planner's settings."""
+        return self.cem if self.planner == "cem" else self.random_shooting
+
+
+@dataclass(frozen=True)
+class MBStitchConfig(PlanningConfig):
     limit: int = 5
     execute: int = 1  # actions of each plan carried out before planning again
     alpha: float = 1.0  # α of Eq. 2, price of the value ensemble's disagreement
@@ -49,14 +64,15 @@ class MBStitchConfig:
     norm: Norm = "mean"  # how Eq. 2's second variance becomes a number
     selective: bool = False  # act only on plans that promise more than the present
     price: Price = "end"  # Var(T) of a plan: of its last state, or the mean over its steps
-    planner: Literal["random-shooting", "cem"] = "cem"
-    random_shooting: RandomShooting = RandomShooting()
-    cem: CEM = CEM()
 
-    @property
-    def horizon(self) -> int:
-        """Steps that plans look ahead."""
-        return (self.cem if self.planner == "cem" else self.random_shooting).horizon
+
+@dataclass(frozen=True)
+class ReachStitchConfig(PlanningConfig):
+    limit: int = 20  # most stitching steps before a skill
+    execute: int = 1  # actions of each plan carried out before planning again
+    beta: float = 0.5  # β of Eq. 2, beside a distance in standard deviations
+    norm: Norm = "mean"  # as MB-Stitch's
+    cem: CEM = CEM(iterations=40, momentum=0.5, tolerance=0.15)
 
 
 @dataclass(frozen=True)
@@ -86,7 +102,12 @@ def check_start(config: MFStitchConfig, agent: IQLConfig, where: str) -> None:
 
 
 MethodConfig = (
-    NoStitchConfig | RandomStitchConfig | MFStitchConfig | MBStitchConfig | SinglePolicyConfig
+    NoStitchConfig
+    | RandomStitchConfig
+    | MFStitchConfig
+    | MBStitchConfig
+    | ReachStitchConfig
+    | SinglePolicyConfig
 )
 SKILLS = "agent"  # the kind of artifact whose policies are told which skill is asked for
 
@@ -115,6 +136,9 @@ METHODS: dict[str, Method] = {
     "random-stitch": Method("Random-Stitch", RandomStitchConfig, RandomStitch),
     "mf-stitch": Method("MF-Stitch", MFStitchConfig, MFStitch, needs=("mf-policy",)),
     "mb-stitch": Method("MB-Stitch", MBStitchConfig, MBStitch, needs=("dynamics",)),
+    "reach-stitch": Method(
+        "Reach-Stitch", ReachStitchConfig, ReachStitch, needs=("dynamics", "initiation-sets")
+    ),
     "single-policy": Method("Single-Policy", SinglePolicyConfig, NoStitch, policy="single-policy"),
 }
 
@@ -213,11 +237,10 @@ def make_stitcher(
         return MFStitch(models["mf-policy"], pairs, config.limit)
     if isinstance(config, MBStitchConfig):
         dynamics: Dynamics = models["dynamics"]
-        planner = config.cem if config.planner == "cem" else config.random_shooting
         return MBStitch(
             agent,
             dynamics,
-            planner,
+            config.chosen,
             benchmark.actions,
             config.alpha,
             config.beta,
@@ -226,6 +249,17 @@ def make_stitcher(
             config.limit,
             config.selective,
             config.price,
+        )
+    if isinstance(config, ReachStitchConfig):
+        return ReachStitch(
+            models["initiation-sets"],
+            models["dynamics"],
+            config.chosen,
+            benchmark.actions,
+            config.beta,
+            config.norm,
+            config.execute,
+            config.limit,
         )
     if method_of(method).stitcher is not NoStitch:
         raise NotImplementedError(f"method {method}: nothing makes its stitcher")

@@ -23,6 +23,7 @@ from orchestrator.methods import (
 from orchestrator.recipes import Recipe, code_fingerprint, digest
 from orchestrator.spec import Spec
 from orchestrator.structure import Plain, to_plain
+from stitching.envs.registry import BENCHMARKS
 
 Prefix = tuple[str, ...]
 
@@ -47,6 +48,7 @@ class Plan:
     dynamics: dict[int, str]
     mf_policies: dict[tuple[int, str], str]  # (seed, method) → key
     single_policies: dict[tuple[int, str], str]
+    initiation_sets: dict[int, str]  # seed → key, the same for all: they are of the data alone
     datasets: dict[str, str]  # role → key
     illustrations: dict[str, str]  # name → key
     nodes: tuple[Node, ...]
@@ -60,7 +62,8 @@ class Plan:
     def models(self) -> set[str]:
         """Keys of all that is trained."""
         own = {*self.mf_policies.values(), *self.single_policies.values()}
-        return {*self.agents.values(), *self.dynamics.values(), *own}
+        for_all = {*self.agents.values(), *self.dynamics.values(), *self.initiation_sets.values()}
+        return for_all | own
 
     @cached_property
     def chunks(self) -> list[tuple[int, int]]:
@@ -109,7 +112,11 @@ class Plan:
 
     def _artifact(self, kind: str, node: Node) -> str:
         """Key of the artifact of a kind that a node's blocks are played with."""
-        for_all = {"agent": self.agents, "dynamics": self.dynamics}
+        for_all = {
+            "agent": self.agents,
+            "dynamics": self.dynamics,
+            "initiation-sets": self.initiation_sets,
+        }
         own = {"mf-policy": self.mf_policies, "single-policy": self.single_policies}
         return for_all[kind][node.seed] if kind in for_all else own[kind][node.seed, node.method]
 
@@ -156,10 +163,14 @@ def make_plan(spec: Spec) -> Plan:
     }
     demonstrations = {role: datasets[role] for role, one in made.items() if one.teaches}
     seeds = range(spec.seeds if SKILLS in needed else 0)
-    agents = {
-        seed: add("agent", {"config": to_plain(spec.agent), "seed": seed, **root}, demonstrations)
-        for seed in seeds
-    }
+    factors = to_plain(BENCHMARKS[spec.benchmark].factors)
+    swapped = {"factors": factors} if spec.agent.swap else {}
+    learner = {"config": to_plain(spec.agent), **swapped, **root}
+    agents = {seed: add("agent", {**learner, "seed": seed}, demonstrations) for seed in seeds}
+    initiation_sets = {}
+    if "initiation-sets" in needed:
+        key = add("initiation-sets", {"factors": factors}, demonstrations)
+        initiation_sets = dict.fromkeys(seeds, key)
     dynamics, mf_policies, single_policies, long_horizon = {}, {}, {}, {}
     for seed in range(spec.seeds):
         if "dynamics" in needed:
@@ -180,7 +191,7 @@ def make_plan(spec: Spec) -> Plan:
                 params = {"config": to_plain(config.training), "seed": seed, **root}
                 single_policies[seed, method] = add("single-policy", params, {"long-horizon": key})
     illustrations = {}
-    if "dynamics" in needed:
+    if any(method_name(method) == "mb-stitch" for method in spec.methods):
         extras = {
             role: add(kind, {"config": settings, **root}) for role, kind in kit.extras.items()
         }
@@ -196,6 +207,7 @@ def make_plan(spec: Spec) -> Plan:
         dynamics,
         mf_policies,
         single_policies,
+        initiation_sets,
         datasets | long_horizon,
         illustrations,
         tuple(_nodes(spec)),
@@ -223,7 +235,7 @@ def _illustrated(spec: Spec, illustration: Illustration) -> Plain:
         }
     task = illustration.task
     if not task:
-        return params | {"horizon": spec.mb_stitch.horizon}
+        return params | {"horizon": spec.mb_stitch.chosen.horizon}
     return params | {
         # Whatever their order in the spec.
         "methods": _settings(spec, "no-stitch") + ours,

@@ -21,7 +21,9 @@ from orchestrator.methods import (
     MBStitchConfig,
     MethodConfig,
     MFStitchConfig,
+    PlanningConfig,
     RandomStitchConfig,
+    ReachStitchConfig,
     SinglePolicyConfig,
     check_start,
     method_name,
@@ -73,6 +75,7 @@ class Spec:
     random_stitch: RandomStitchConfig = RandomStitchConfig()
     mf_stitch: MFStitchConfig = MFStitchConfig()
     mb_stitch: MBStitchConfig = MBStitchConfig()
+    reach_stitch: ReachStitchConfig = ReachStitchConfig()
     single_policy: SinglePolicyConfig = SinglePolicyConfig()
     tables: tuple[TableSpec, ...] = ()
 
@@ -106,6 +109,7 @@ class Spec:
             "random-stitch": to_plain(self.random_stitch),
             "mf-stitch": to_plain(self.mf_stitch),
             "mb-stitch": to_plain(self.mb_stitch),
+            "reach-stitch": to_plain(self.reach_stitch),
             "single-policy": to_plain(self.single_policy),
         }
         config = merged(settings[name], nested(overrides))
@@ -122,6 +126,7 @@ def check_spec(spec: Spec) -> None:
     _check_numbers(to_plain(spec), where)
     _check_tasks(spec, where)
     _check_methods(spec, where)
+    _check_swaps(spec, where)
     ids = [table.id for table in spec.tables]
     for table in spec.tables:
         check_rows(table, f"{where}, table {table.id}")
@@ -213,11 +218,25 @@ def _check_methods(spec: Spec, where: str) -> None:
         if isinstance(config, SinglePolicyConfig):
             _check_demonstrated(spec, config, f"{where}, {method}")
         discrete = BENCHMARKS[spec.benchmark].actions.discrete
-        if isinstance(config, MBStitchConfig) and config.planner == "cem" and discrete:
+        if isinstance(config, PlanningConfig) and config.planner == "cem" and discrete:
             raise UsageError(
                 f"{where}, {method}: cem plans continuous actions, {spec.benchmark} has discrete "
                 "ones; set planner to random-shooting"
             )
+
+
+def _check_swaps(spec: Spec, where: str) -> None:
+    """Only where a row demonstrates one skill, among several objects, are there any to swap."""
+    learners = {"mf_stitch": spec.mf_stitch.training, "single_policy": spec.single_policy.training}
+    for name, training in learners.items():
+        if training.swap:
+            raise UsageError(f"{where}, {name}.training.swap: only agent.swap swaps objects")
+    if not spec.agent.swap:
+        return
+    if len(BENCHMARKS[spec.benchmark].factors.objects) < 2:
+        raise UsageError(f"{where}, agent.swap: {spec.benchmark} has no objects to swap")
+    if not spec.agent.multi_task:
+        raise UsageError(f"{where}, agent.swap: needs agent.multi_task")
 
 
 def _check_demonstrated(spec: Spec, config: SinglePolicyConfig, where: str) -> None:

@@ -119,6 +119,7 @@ class Witness:
         self.traces: dict[int, Trace] = {}  # by episode
 
     before_first: ClassVar[bool] = MBStitch.before_first
+    until_value_falls: ClassVar[bool] = MBStitch.until_value_falls
 
     @property
     def limit(self) -> int:

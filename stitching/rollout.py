@@ -150,8 +150,8 @@ def _stitch(
     value_start: np.ndarray,
     value: Callable[[np.ndarray, int], np.ndarray],
 ) -> None:
-    """Stitching phase: until the stitcher wants no more, the next skill's value no longer rises,
-    or the limit."""
+    """Stitching phase: until the stitcher wants no more, the next skill's value no longer rises
+    (where the stitcher's stitches end by it), or the limit."""
     streams = play.streams("planner", by_method=True)
     values = value_start.copy()
     rows = progress.open(np.arange(len(values)))
@@ -171,10 +171,11 @@ def _stitch(
             still = still[progress.steps[still] < stitcher.limit]
             sequences = sequences[np.isin(rows, still)]
             rows = still
-        new_values = value(rows, progress.skill)
-        rising = new_values > values[rows]
-        values[rows] = new_values
-        rows = rows[rising]
+        if stitcher.until_value_falls:
+            new_values = value(rows, progress.skill)
+            rising = new_values > values[rows]
+            values[rows] = new_values
+            rows = rows[rising]
 
 
 def _execute(

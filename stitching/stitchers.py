@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import ClassVar, Protocol
 
 import numpy as np
-import torch
 from torch import Tensor
 
 from stitching.envs.protocol import ActionSpace
 from stitching.models.agent import Agent
 from stitching.models.dynamics import Dynamics
+from stitching.planning.imagining import imagined
 from stitching.planning.objective import Norm, Price, conservative_value
 from stitching.planning.protocol import Planner, Score
 
@@ -35,6 +35,7 @@ class Stitcher(Protocol):
     """Chooses the actions that lead to a skill, and whether there are to be any."""
 
     before_first: ClassVar[bool]  # it can stitch to a task's first skill, which follows none
+    until_value_falls: ClassVar[bool]  # its stitches end where the next skill's value rises no more
 
     @property
     def limit(self) -> int:
@@ -59,6 +60,7 @@ class NoStitch:
     """The next skill starts where the last one ended."""
 
     before_first: ClassVar[bool] = False
+    until_value_falls: ClassVar[bool] = True
     limit: int = 0
 
     def propose(
@@ -76,6 +78,7 @@ class RandomStitch:
     """Uniform random actions, under the same stop rule as MB-Stitch."""
 
     before_first: ClassVar[bool] = True
+    until_value_falls: ClassVar[bool] = True
     actions: ActionSpace
     limit: int
 
@@ -94,6 +97,7 @@ class MFStitch:
     """The mode of an extra policy learned from the mixed data; conditioned on the pair."""
 
     before_first: ClassVar[bool] = False  # there is no pair
+    until_value_falls: ClassVar[bool] = True
     policy: Agent
     pairs: dict[tuple[int, int], int]  # (previous, following) → the policy's condition
     limit: int
@@ -115,6 +119,7 @@ class MBStitch:
     """Ours: plan with the dynamics ensemble towards high, certain value of the next skill."""
 
     before_first: ClassVar[bool] = True
+    until_value_falls: ClassVar[bool] = True
     agent: Agent
     dynamics: Dynamics
     planner: Planner
@@ -152,20 +157,7 @@ class MBStitch:
 
     def score(self, states: Tensor, following: int) -> Score:
         """Eq. 2 of each imagined action sequence, every member on its own path."""
-
-        def score(problems: Tensor, actions: Tensor) -> Tensor:
-            population = actions.shape[1]
-            starts = states[problems].repeat_interleave(population, dim=0)
-            sequences = actions.flatten(0, 1)  # (problems · population, horizon, action)
-            if self.actions.discrete:
-                # Few distinct sequences, and often one start for all: imagine each but once.
-                starts, sequences, inverse = distinct(starts, sequences)
-                return self._imagine(starts, sequences, following)[inverse].unflatten(
-                    0, (-1, population)
-                )
-            return self._imagine(starts, sequences, following).unflatten(0, (-1, population))
-
-        return score
+        return imagined(states, self.actions, partial(self._imagine, following=following))
 
     def _imagine(self, starts: Tensor, sequences: Tensor, following: int) -> Tensor:
         """Eq. 2 of sequences, (n, observation), (n, horizon, action) → (n,).
@@ -188,14 +180,6 @@ class MBStitch:
             self.beta,
             self.norm,
         )
-
-
-def distinct(starts: Tensor, sequences: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-    """Distinct pairs of start and sequence, and where each of the n given pairs went, (n,)."""
-    pairs = torch.cat([starts, sequences.flatten(1)], dim=1)
-    unique, inverse = pairs.unique(dim=0, return_inverse=True)
-    width = starts.shape[1]
-    return unique[:, :width], unique[:, width:].unflatten(1, sequences.shape[1:]), inverse
 
 
 def policy_noise(actions: ActionSpace, streams: Sequence[np.random.Generator]) -> np.ndarray:

@@ -76,7 +76,7 @@ class Showing:
             steps = config.cem.population * config.cem.iterations
         else:
             steps = config.random_shooting.population
-        return float(plans * steps * config.horizon)
+        return float(plans * steps * config.chosen.horizon)
 
     def instances(self, places: dict[tuple[str, int], int]) -> dict[int, float]:
         """Place of a (task, episode) → its paired gain over No-Stitch, mean over seeds.

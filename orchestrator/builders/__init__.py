@@ -18,6 +18,11 @@ BUILDERS: dict[str, Builder] = (
 )
 
 # What decides a block's outcome beside the models: Algorithm 1, the planners, what counts,
-BLOCK_CODE = ("stitching.rollout", "stitching.envs.first_times", *PLANNERS)
+BLOCK_CODE = (
+    "stitching.rollout",
+    "stitching.reach_stitch",
+    "stitching.envs.first_times",
+    *PLANNERS,
+)
 # and how they are set up, without the method's code that these import for other purposes.
 BLOCK_SETUP = ("orchestrator.builders.models", "orchestrator.methods", "orchestrator.worker")

@@ -10,6 +10,7 @@ from stitching.data.uncut import no_conditions
 from stitching.envs.protocol import Benchmark, conditions
 from stitching.models.agent import Agent
 from stitching.models.dynamics import Dynamics, DynamicsConfig
+from stitching.reach_stitch import Initiation
 
 
 def load_models(benchmark: Benchmark, configs: Plain, artifacts: Inputs) -> dict[str, Any]:
@@ -24,6 +25,8 @@ def load_models(benchmark: Benchmark, configs: Plain, artifacts: Inputs) -> dict
         elif kind == "single-policy":
             unconditioned = no_conditions(len(benchmark.skills))
             models[kind] = Agent(artifact.arrays, unconditioned, benchmark.actions)
+        elif kind == "initiation-sets":
+            models[kind] = Initiation.of(artifact.arrays)
         elif kind == "dynamics":
             config = structure(DynamicsConfig, configs[kind], kind)
             models[kind] = Dynamics(artifact.arrays, config)

@@ -10,8 +10,11 @@ from orchestrator.builders.parts import Builder, Inputs
 from orchestrator.store import Artifact
 from orchestrator.structure import Plain, structure
 from stitching.data.experience import skill_experience
+from stitching.data.initiation import initiation_set, pose_scale
 from stitching.data.mixtures import mixed_experience, skill_pairs
+from stitching.data.swapping import Swapping
 from stitching.data.transitions import Transitions, check, concatenate
+from stitching.envs.factors import Factors
 from stitching.envs.protocol import Benchmark, conditions
 from stitching.envs.registry import BENCHMARKS
 from stitching.models.agent import own_weights
@@ -45,8 +48,15 @@ def _agent(params: Plain, inputs: Inputs) -> Artifact:
     benchmark, data = _checked_data(params, inputs)
     config = structure(IQLConfig, params["config"], "agent")
     experience = skill_experience(data, conditions(benchmark))
-    train = train_iql if config.multi_task else train_single_tasks
-    return _trained(train(experience, benchmark.actions, config, *_labels("agent", params)))
+    actions, labels = benchmark.actions, _labels("agent", params)
+    if not config.multi_task:
+        return _trained(train_single_tasks(experience, actions, config, *labels))
+    swapping = None
+    if config.swap:
+        factors = structure(Factors, params["factors"], "factors")
+        names = [skill.name for skill in benchmark.skills]
+        swapping = Swapping.of(data, factors, names, config.swap)
+    return _trained(train_iql(experience, actions, config, *labels, swapping=swapping))
 
 
 def _mf_policy(params: Plain, inputs: Inputs) -> Artifact:
@@ -94,6 +104,20 @@ def _dynamics(params: Plain, inputs: Inputs) -> Artifact:
     return _trained(train_dynamics(data, config, *_labels("dynamics", params)))
 
 
+def _initiation_sets(params: Plain, inputs: Inputs) -> Artifact:
+    """Every skill's initiation set, in one artifact: see `Initiation.of`."""
+    benchmark, data = _checked_data(params, inputs)
+    factors = structure(Factors, params["factors"], "factors")
+    sets = [initiation_set(data, factors, skill) for skill in range(len(benchmark.skills))]
+    arrays = {
+        "columns": np.array(factors.pose),
+        "scale": pose_scale(data, factors),
+        "radii": np.array([one.radius for one in sets]),
+    }
+    poses = {f"poses.{skill}": one.poses for skill, one in enumerate(sets)}
+    return Artifact(arrays | poses, {"sizes": [len(one.poses) for one in sets]})
+
+
 SETUP = ("orchestrator.builders.training",)
 LEARNING = ("stitching.models.iql", "stitching.data.experience")
 MIXED = (*LEARNING, "stitching.data.mixtures", "stitching.models.agent")
@@ -101,5 +125,6 @@ MIXED = (*LEARNING, "stitching.data.mixtures", "stitching.models.agent")
 TRAINING_BUILDERS = {
     "agent": Builder(_agent, LEARNING, SETUP),
     "mf-policy": Builder(_mf_policy, MIXED, SETUP),
+    "initiation-sets": Builder(_initiation_sets, ("stitching.data.initiation",), SETUP),
     "dynamics": Builder(_dynamics, ("stitching.models.dynamics",), SETUP),
 }

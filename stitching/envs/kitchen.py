@@ -26,6 +26,7 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 
+from stitching.envs.factors import Factors
 from stitching.envs.protocol import ActionSpace, Skill
 
 POSITIONS, VELOCITIES = 30, 29  # MuJoCo's nq and nv
@@ -102,6 +103,20 @@ class Kitchen:
     def skills(self) -> tuple[Skill, ...]:
         one_hot = np.eye(len(SKILLS)).tolist()
         return tuple(Skill(name, tuple(row)) for name, row in zip(SKILLS, one_hot, strict=True))
+
+    @cached_property
+    def factors(self) -> Factors:
+        """The joints' positions, and what each skill moves: its positions and velocities."""
+        objects = {}
+        for name, (positions, _) in GOALS.items():
+            # Velocities are numbered alike, but that the kettle has one fewer, and is the last.
+            velocities = range(positions.start, min(positions.stop, VELOCITIES))
+            numbers = [
+                *range(positions.start, positions.stop),
+                *(POSITIONS + v for v in velocities),
+            ]
+            objects[name] = tuple(np.flatnonzero(np.isin(SEEN, numbers)).tolist())
+        return Factors(tuple(range(JOINTS)), objects, own={name: name for name in SKILLS})
 
     @cached_property
     def blur(self) -> np.ndarray:

@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from stitching.envs.factors import Factors
 from stitching.envs.protocol import ActionSpace, Skill
 
 Cell = tuple[int, int]
@@ -33,6 +34,7 @@ class Maze:
     observation_size = 6  # row and column, then free cells to W, N, E, S; all divided by the side
     snapshot_size = 2
     actions = ActionSpace(size=len(MOVES), discrete=True)
+    factors = Factors(pose=(0, 1))
 
     def __post_init__(self) -> None:
         for name, cell in (("spawn", self.spawn), *self.goals):

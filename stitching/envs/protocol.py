@@ -8,6 +8,8 @@ from typing import Protocol
 
 import numpy as np
 
+from stitching.envs.factors import Factors
+
 
 @dataclass(frozen=True)
 class ActionSpace:
@@ -81,6 +83,9 @@ class Benchmark(Protocol):
 
     @property
     def actions(self) -> ActionSpace: ...
+
+    @property
+    def factors(self) -> Factors: ...
 
     def block(self) -> EpisodeBlock:
         """A new, empty block of episodes."""

@@ -16,6 +16,7 @@ import torch
 from torch import Tensor
 
 from stitching.data.experience import Experience
+from stitching.data.swapping import Swapping
 from stitching.envs.protocol import ActionSpace
 from stitching.models.layers import Params, Precision, at_precision, init_mlp, mlp, prefixed
 from stitching.models.scale import observation_scale
@@ -46,7 +47,12 @@ class IQLConfig:
     policy_layers: int = 0
     precision: Precision = "float32"  # of the hidden layers while training
     multi_task: bool = True  # one set of networks for all skills (Maze, Kitchen), or one a skill
+    swap: float = 0.0  # share of the transitions in which objects that play no part are swapped
     log_every: int = 500
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.swap <= 1:
+            raise ValueError(f"swap: must lie in [0, 1]: {self.swap}")
 
     @property
     def policy_hidden(self) -> list[int]:
@@ -130,11 +136,13 @@ def train_iql(
     config: IQLConfig,
     *labels: str | int,
     policy_from: Params | None = None,
+    swapping: Swapping | None = None,
 ) -> Trained:
     """Learn value ensemble and policy; all randomness comes from streams named by `labels`.
 
     `policy_from`, of the same shape and with its "log_std", is where the policy starts; the values
-    are learned anew. Raises FloatingPointError when a loss stops being finite.
+    are learned anew. `swapping` alters the minibatches. Raises FloatingPointError when a loss stops
+    being finite.
     """
     mean, std = observation_scale(experience.data.observations)
     state = experience.data.observations.shape[1] + experience.conditions.shape[1]
@@ -159,7 +167,8 @@ def train_iql(
     generator = torch.Generator().manual_seed(int(stream("dropout", *labels).integers(2**63)))
 
     log = CurveLog(config.updates, config.log_every)
-    batches = minibatches(experience, mean, std, config.batch_size, stream("batches", *labels))
+    rng = stream("batches", *labels)
+    batches = minibatches(experience, mean, std, config.batch_size, rng, swapping)
     for update in range(config.updates):
         if config.learning_rate_decay:
             rate = config.learning_rate * cosine(update, config.updates)
@@ -208,8 +217,9 @@ def minibatches(
     std: np.ndarray,
     batch_size: int,
     rng: np.random.Generator,
+    swapping: Swapping | None = None,
 ) -> Iterator[Batch]:
-    """Endless uniform minibatches, drawn with replacement."""
+    """Endless uniform minibatches, drawn with replacement; `swapping` alters s and s' alike."""
     data = experience.data
     observations = torch.from_numpy((np.asarray(data.observations) - mean) / std)
     next_observations = torch.from_numpy((np.asarray(data.next_observations) - mean) / std)
@@ -219,13 +229,19 @@ def minibatches(
     conditions = torch.from_numpy(experience.conditions)
     rewards = torch.from_numpy(experience.rewards)
     continues = torch.from_numpy((~experience.terminals).astype(np.float32))
+    columns = torch.arange(observations.shape[1])
     while True:
         for index in torch.from_numpy(rng.integers(len(rows), size=(256, batch_size))):
             row, condition = rows[index], conditions[condition_ids[index]]
+            now, following = observations[row], next_observations[row]
+            if swapping is not None:
+                swapped, donors = map(torch.from_numpy, swapping.draw(row.numpy(), rng))
+                other = observations[donors, columns]
+                now, following = (torch.where(swapped, other, own) for own in (now, following))
             yield Batch(
-                inputs=torch.cat([observations[row], condition], dim=-1),
+                inputs=torch.cat([now, condition], dim=-1),
                 actions=actions[row],
-                next_inputs=torch.cat([next_observations[row], condition], dim=-1),
+                next_inputs=torch.cat([following, condition], dim=-1),
                 rewards=rewards[index],
                 continues=continues[index],
             )

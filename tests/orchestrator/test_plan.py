@@ -188,3 +188,23 @@ def test_the_registry_names_the_environments_that_data_are_made_in() -> None:
 def test_no_score_depends_on_what_is_only_looked_at(plan: Plan) -> None:
     made = {recipe.kind for recipe in plan.recipes.values()}
     assert made - plan.scored_kinds == {"maze-showcase"}
+
+
+def test_initiation_sets_are_of_the_data_alone(spec: Spec) -> None:
+    plan = make_plan(replace(spec, methods=("no-stitch", "reach-stitch")))
+    key = plan.initiation_sets[0]
+    assert set(plan.initiation_sets.values()) == {key}
+    assert plan.recipes[key].inputs == plan.recipes[plan.agents[0]].inputs
+    other = replace(spec, methods=("reach-stitch",), agent=replace(spec.agent, width=7), seeds=1)
+    assert make_plan(other).initiation_sets == {0: key}
+    assert key in plan.needed
+    assert not make_plan(spec).initiation_sets
+
+
+def test_what_objects_are_swapped_names_the_agent() -> None:
+    kitchen = load_spec("table2", "smoke")
+    swapped = replace(kitchen, agent=replace(kitchen.agent, swap=0.8))
+    agent = make_plan(swapped).recipes[make_plan(swapped).agents[0]]
+    assert agent.params["factors"]["own"]["kettle"] == "kettle"
+    usual = make_plan(kitchen)
+    assert "factors" not in usual.recipes[usual.agents[0]].params

@@ -6,6 +6,7 @@ import torch
 from hypothesis import settings
 
 from stitching.data.experience import skill_experience
+from stitching.data.initiation import initiation_set, pose_scale
 from stitching.data.maze import MazeDataConfig, exploration, skill_demonstrations
 from stitching.data.mixtures import mixed_experience, skill_pairs
 from stitching.data.transitions import Transitions, concatenate
@@ -16,6 +17,7 @@ from stitching.models.agent import Agent
 from stitching.models.dynamics import Dynamics, DynamicsConfig, train_dynamics
 from stitching.models.iql import IQLConfig, train_iql
 from stitching.planning.random_shooting import RandomShooting
+from stitching.reach_stitch import Initiation, ReachStitch
 from stitching.stitchers import MBStitch, MFStitch, NoStitch, RandomStitch, Stitcher
 
 torch.set_num_threads(1)
@@ -75,11 +77,22 @@ def dynamics(maze: Maze, demonstrations: Transitions) -> Dynamics:
 
 @pytest.fixture(scope="session")
 def stitchers(
-    maze: Maze, agent: Agent, mf_policy: Agent, dynamics: Dynamics
+    maze: Maze,
+    demonstrations: Transitions,
+    agent: Agent,
+    mf_policy: Agent,
+    dynamics: Dynamics,
 ) -> dict[str, Stitcher]:
-    """The four methods, and MB-Stitch that plans anew after every action, by name."""
+    """The methods that join skills, and MB-Stitch that plans anew after every action, by name."""
     planner = RandomShooting(population=30, horizon=4)
     planning = (agent, dynamics, planner, maze.actions, 1.0, 1.0, "mean")
+    sets = [initiation_set(demonstrations, maze.factors, skill) for skill in range(4)]
+    initiation = Initiation(
+        list(maze.factors.pose),
+        torch.from_numpy(pose_scale(demonstrations, maze.factors)),
+        [torch.from_numpy(one.poses) for one in sets],
+        [one.radius for one in sets],
+    )
     pairs = {pair: row for row, pair in enumerate(skill_pairs(len(maze.skills)))}
     return {
         "no-stitch": NoStitch(),
@@ -87,4 +100,7 @@ def stitchers(
         "mf-stitch": MFStitch(mf_policy, pairs, limit=5),
         "mb-stitch": MBStitch(*planning, execute=4, limit=5),
         "mb-stitch[execute=1]": MBStitch(*planning, execute=1, limit=5),
+        "reach-stitch": ReachStitch(
+            initiation, dynamics, planner, maze.actions, beta=0.5, norm="mean", execute=1, limit=8
+        ),
     }

@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise, permutations
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -34,7 +35,9 @@ from stitching.stitchers import NoStitch, Proposal, RandomStitch, Stitcher
 SAMPLED, MODE = RolloutConfig(temperature=1.0), RolloutConfig()
 FIRST = replace(SAMPLED, first_stitch=True)
 STEP_LIMIT = 40
-METHODS = ["no-stitch", "random-stitch", "mf-stitch", "mb-stitch", "mb-stitch[execute=1]"]
+METHODS = [
+    "no-stitch", "random-stitch", "mf-stitch", "mb-stitch", "mb-stitch[execute=1]", "reach-stitch",
+]  # fmt: skip
 TASKS = [("a", "b", "c"), ("d", "b", "a"), ("b", "d", "c", "a"), ("c", "a", "d", "b")]
 
 each_method = pytest.mark.parametrize("method", METHODS)
@@ -198,7 +201,8 @@ def test_a_first_skill_is_stitched_to_where_the_method_can(
 
     without, with_first = first(SAMPLED), first(FIRST)
     assert not without.stitch_steps.any()
-    assert with_first.stitch_steps.any() == stitchers[method].before_first
+    there = method == "reach-stitch"  # these skills begin at the start cell: it is there already
+    assert with_first.stitch_steps.any() == (stitchers[method].before_first and not there)
     if not stitchers[method].before_first:
         assert raw(without) == raw(with_first)
 
@@ -500,6 +504,7 @@ class PlannerRecorder:
 
     drawn: list[bytes]
     limit: int = 1
+    until_value_falls: ClassVar[bool] = True
 
     def propose(
         self,
@@ -567,6 +572,7 @@ class Signposts:
     signs: dict[int, list[int]]
     limit: int
     asked: list[int] = field(default_factory=list)  # how many episodes, each time
+    until_value_falls: bool = True
 
     def propose(
         self,
@@ -646,6 +652,14 @@ def test_each_value_is_compared_with_the_last_not_the_first() -> None:
     outcome, _ = on_the_floor(walker(v_row=[-1.0]), Signposts(signs, limit=20), [(8, 2)])
     assert outcome.stitch_steps.tolist() == [3]
     np.testing.assert_allclose(outcome.value_end, [-7], rtol=1e-5)
+
+
+def test_a_stitch_goes_on_where_the_value_falls_if_it_does_not_end_by_it() -> None:
+    """North, where V rises, and south again and again, until the limit or where no sign is."""
+    signs = {8: [UP], 7: [DOWN], 3: [DOWN], 4: [DOWN]}
+    stitcher = Signposts(signs, limit=6, until_value_falls=False)
+    outcome, _ = on_the_floor(walker(v_row=[-1.0]), stitcher, [(8, 2), (3, 2)])
+    assert outcome.stitch_steps.tolist() == [6, 2]
 
 
 def test_the_mean_over_the_members_decides() -> None:

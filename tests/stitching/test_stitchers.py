@@ -23,7 +23,6 @@ from stitching.stitchers import (
     NoStitch,
     RandomStitch,
     Stitcher,
-    distinct,
     policy_noise,
 )
 from stitching.streams import stream
@@ -314,19 +313,6 @@ def test_the_previous_skill_does_not_matter_to_mb_stitch() -> None:
     stitcher, states = mb_stitch(MOVES), torch.from_numpy(planned_from())
     from_first = stitcher.propose(states, 0, 1, streams(4)).actions
     assert np.array_equal(stitcher.propose(states, 1, 1, streams(4)).actions, from_first)
-
-
-@pytest.mark.parametrize("copies", [1, 3])
-def test_distinct_pairs_are_found_again(copies: int) -> None:
-    rng = stream("distinct")
-    starts = torch.from_numpy(np.repeat(rng.integers(2, size=(30, 3)), copies, axis=0)).float()
-    sequences = np.repeat(MOVES.uniform(rng, (30, 2)), copies, axis=0)
-    sequences = torch.from_numpy(sequences)
-    own_starts, own_sequences, inverse = distinct(starts, sequences)
-    assert torch.equal(own_starts[inverse], starts)
-    assert torch.equal(own_sequences[inverse], sequences)
-    pairs = torch.cat([starts, sequences.flatten(1)], dim=1).tolist()
-    assert len(own_starts) == len(own_sequences) == len({tuple(pair) for pair in pairs})
 
 
 # Two members each, linear, so that the right plan can be told: x moves by the action.

@@ -8,6 +8,7 @@ from typing import Protocol
 import mujoco
 import numpy as np
 
+from stitching.envs.factors import Factors
 from stitching.envs.robosuite.control import (
     FINGER_MIDDLE,
     FINGER_SPAN,
@@ -40,6 +41,7 @@ FINGER_POSITIONS = slice(7, 9)  # m
 FINGER_SPEEDS = slice(9, 11)  # m/s
 OBJECTS = slice(11, 25)
 GROUPS = {"gripper": slice(0, 11), "objects": OBJECTS}
+FACTORS = Factors(pose=tuple(range(9)))  # objects are told relative to the gripper, too
 
 # What the next substep depends on, the solver's warm start included.
 PHYSICS = int(mujoco.mjtState.mjSTATE_PHYSICS) | int(mujoco.mjtState.mjSTATE_WARMSTART)

@@ -11,6 +11,7 @@ import numpy as np
 from stitching.envs.protocol import ActionSpace, Skill
 from stitching.envs.robosuite.block import (
     ACTION_SIZE,
+    FACTORS,
     GRIP_POSITION,
     OBSERVATION_SIZE,
     RobosuiteBlock,
@@ -54,6 +55,7 @@ class Can:
     skills = (Skill("can", (1.0,)),)
     observation_size = OBSERVATION_SIZE
     actions = ActionSpace(size=ACTION_SIZE, discrete=False)
+    factors = FACTORS
     fixture_size = 0
 
     @cached_property

@@ -11,6 +11,7 @@ import numpy as np
 from stitching.envs.protocol import ActionSpace, Skill
 from stitching.envs.robosuite.block import (
     ACTION_SIZE,
+    FACTORS,
     OBSERVATION_SIZE,
     RobosuiteBlock,
     sizes,
@@ -47,6 +48,7 @@ class Door:
     name = "robosuite-door"
     observation_size = OBSERVATION_SIZE
     actions = ActionSpace(size=ACTION_SIZE, discrete=False)
+    factors = FACTORS
     fixture_size = 7  # the door's position (m) and unit quaternion (w x y z)
 
     @property

@@ -235,3 +235,15 @@ def test_a_block_of_nobody(benchmark: Benchmark) -> None:
     assert block.observe(ROWS[:0]).shape == (0, benchmark.observation_size)
     block.restore(block.snapshot(ROWS[:0]), [])
     assert block.snapshot(ROWS[:0]).shape == (0, benchmark.snapshot_size)
+
+
+def test_factors_are_columns_of_the_observation_each_of_one_part(benchmark: Benchmark) -> None:
+    factors, size = benchmark.factors, benchmark.observation_size
+    parts = [factors.pose, *factors.objects.values()]
+    columns = [column for part in parts for column in part]
+    assert factors.pose
+    assert all(parts)
+    assert len(set(columns)) == len(columns)
+    assert set(columns) <= set(range(size))
+    assert set(factors.own) <= {skill.name for skill in benchmark.skills}
+    assert set(factors.own.values()) <= set(factors.objects)

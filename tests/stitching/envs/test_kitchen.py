@@ -479,3 +479,17 @@ def test_a_human_episode_equals_the_originals(episodes: Episodes, original: Kitc
         assert block.snapshot(row)[0].tobytes() == scenes[step].tobytes(), f"step {step}"
         np.testing.assert_array_equal(achievements(block, row)[0], achieved[step])
     assert achieved[:, HUMAN_SKILLS].any(axis=0).all()
+
+
+@pytest.mark.parametrize("skill", SKILLS)
+def test_an_objects_columns_are_its_joints_positions_and_velocities(skill: str) -> None:
+    model = kitchen_model()
+    seen = {number: column for column, number in enumerate(SEEN.tolist())}
+    columns = []
+    for joint in range(model.njnt):
+        position, velocity = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
+        if position in OBS_ELEMENT_INDICES[skill]:
+            free = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
+            columns += [seen[position + i] for i in range(7 if free else 1)]
+            columns += [seen[model.nq + velocity + i] for i in range(6 if free else 1)]
+    assert sorted(columns) == list(KITCHEN.factors.objects[skill])

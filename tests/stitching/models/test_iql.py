@@ -11,7 +11,9 @@ from scipy.stats import norm
 from torch import Tensor, nn
 
 from stitching.data.experience import Experience, skill_experience
+from stitching.data.swapping import Swapping
 from stitching.data.transitions import DataError, Transitions
+from stitching.envs.factors import NO_OBJECT
 from stitching.envs.protocol import ActionSpace
 from stitching.models.agent import Agent
 from stitching.models.iql import (
@@ -552,3 +554,27 @@ def test_a_high_expectile_gives_gamma_to_the_steps_still_needed(
 def test_the_policy_goes_the_right_way(walkers: dict[float, Agent], expectile: float) -> None:
     actions = walkers[expectile].act(torch.eye(LENGTH), 0, None)
     assert actions.argmax(axis=1).tolist() == [RIGHT] * LENGTH
+
+
+def test_swapped_objects_are_the_same_in_both_states_and_others_as_they_were() -> None:
+    experience = experience_of(SPACES["continuous"])
+    mean, std = observation_scale(experience.data.observations)
+    owned = np.array([NO_OBJECT, 0, 1])
+    free = np.tile([True, False], (len(experience.data), 1))
+    swapping = Swapping(share=1.0, object_of=owned, bystanders=free)
+
+    def first_batch(swapping: Swapping | None) -> Batch:
+        return next(minibatches(experience, mean, std, 200, stream("swaps"), swapping))
+
+    plain, swapped = first_batch(None), first_batch(swapping)
+    untouched = [0, 2, 3, 4]  # the robot, the object that plays a part, the condition
+    for before, after in ((plain.inputs, swapped.inputs), (plain.next_inputs, swapped.next_inputs)):
+        assert torch.equal(before[:, untouched], after[:, untouched])
+    moved = (plain.inputs[:, 1] != swapped.inputs[:, 1]).numpy()
+    assert moved.mean() == pytest.approx(0.5, abs=0.1)
+    alike = swapped.inputs[:, 1] == swapped.next_inputs[:, 1]
+    assert alike[moved].all()
+    assert (alike | (plain.next_inputs[:, 1] == swapped.next_inputs[:, 1])).all()
+    seen = (experience.data.observations[:, 1] - mean[1]) / std[1]
+    assert np.isin(swapped.inputs[:, 1].numpy(), seen).all()
+    assert torch.equal(plain.rewards, swapped.rewards)

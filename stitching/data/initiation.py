@@ -1,0 +1,82 @@
+"""Initiation sets: the poses of the robot from which a skill was demonstrated.
+
+The word is that of options (Sutton, Precup and Singh 1999): the states in which one may begin.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from stitching.data.transitions import Transitions
+from stitching.envs.factors import Factors
+from stitching.models.scale import observation_scale
+
+BEGINNING = 4  # states of a demonstration, from its first, that count as its start
+COVERED = 0.9  # share of the demonstrations whose start is within ε of another one's
+FINENESS = 0.25  # of ε: poses nearer than this to one that is kept are left out
+
+
+@dataclass(frozen=True)
+class InitiationSet:
+    """Where one skill begins, as poses in units of `scale`, and how near is near enough.
+
+    A skill with fewer than two demonstrations that succeed has an empty set, and ε is infinite:
+    nothing is known of where it begins.
+    """
+
+    poses: np.ndarray  # (P, pose) float32
+    radius: float  # ε: a pose this near to one of the set is in it
+
+
+def pose_scale(data: Transitions, factors: Factors) -> np.ndarray:
+    """What the numbers of a pose are divided by, (pose,) float32.
+
+    Their standard deviation over the dataset, times the square root of how many there are: two
+    poses that differ by one standard deviation in every number are at a Euclidean distance of 1.
+    """
+    _, deviation = observation_scale(data.observations)
+    scale: np.ndarray = deviation[list(factors.pose)] * np.float32(len(factors.pose) ** 0.5)
+    return scale
+
+
+def initiation_set(data: Transitions, factors: Factors, skill: int) -> InitiationSet:
+    """The starts of a skill's demonstrations that succeeded, thinned.
+
+    ε is the distance from a demonstration's first pose to the nearest one of another demonstration
+    that 90 % do not exceed, or what the robot moves in one step of these data (their median) where
+    that is more: no stitch can be finer than a step. A pose is kept if it is farther than ε/4 from
+    all that were kept before it, in the dataset's order, so the set covers every start to ε/4.
+    """
+    shown = [
+        rows
+        for rows, success in zip(
+            data.episode_rows(skill),
+            data.episode_successes[data.episode_skills == skill],
+            strict=True,
+        )
+        if success
+    ]
+    scale, columns = pose_scale(data, factors), list(factors.pose)
+    if len(shown) < 2:
+        return InitiationSet(np.empty((0, len(columns)), dtype=np.float32), np.inf)
+    first = data.observations[[rows[0] for rows in shown]][:, columns] / scale
+    every = np.concatenate(shown)
+    moves = (data.next_observations[every] - data.observations[every])[:, columns] / scale
+    apart = np.asarray(KDTree(first).query(first, k=2)[0])[:, 1]
+    step = float(np.median(np.linalg.norm(moves, axis=1)))
+    radius = max(float(np.quantile(apart, COVERED)), step)
+    starts = np.concatenate([rows[:BEGINNING] for rows in shown])
+    poses = data.observations[starts][:, columns] / scale
+    return InitiationSet(_thinned(poses, FINENESS * radius), radius)
+
+
+def _thinned(poses: np.ndarray, gap: float) -> np.ndarray:
+    """Those farther than `gap` from all kept before them: (n, pose) → (P, pose)."""
+    kept = np.empty((0, poses.shape[1]), dtype=poses.dtype)
+    for pose in poses:
+        if not len(kept) or np.linalg.norm(kept - pose, axis=1).min() > gap:
+            kept = np.concatenate([kept, pose[None]])
+    return kept

@@ -1,0 +1,36 @@
+"""Which numbers of an observation belong together: the robot's pose, and each object."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+NO_OBJECT = -1
+
+
+@dataclass(frozen=True)
+class Factors:
+    """Parts of an observation that can change one without the other.
+
+    Numbers that relate two parts, such as the gripper's distance from a door, belong to no object.
+    """
+
+    pose: tuple[int, ...]  # columns that say where the robot is, velocities left out
+    objects: dict[str, tuple[int, ...]] = field(default_factory=dict)  # name → its own columns
+    own: dict[str, str] = field(default_factory=dict)  # skill → the object its goal is about
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The objects, in the order in which others number them."""
+        return tuple(self.objects)
+
+    def object_of(self, size: int) -> np.ndarray:
+        """The number of the object that each of `size` columns belongs to, (size,) int64.
+
+        NO_OBJECT (−1) where a column belongs to none.
+        """
+        numbers = np.full(size, NO_OBJECT)
+        for number, columns in enumerate(self.objects.values()):
+            numbers[list(columns)] = number
+        return numbers

@@ -1,0 +1,92 @@
+"""Reach-Stitch: lead the robot to where the next skill was demonstrated to begin."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from stitching.envs.protocol import ActionSpace
+from stitching.models.dynamics import Dynamics
+from stitching.planning.imagining import imagined
+from stitching.planning.objective import Norm, conservative_value
+from stitching.planning.protocol import Planner
+from stitching.stitchers import Proposal
+
+
+@dataclass(frozen=True)
+class Initiation:
+    """The initiation sets of all skills (stitching.data.initiation), ready to be asked."""
+
+    columns: list[int]  # of an observation, that make the robot's pose
+    scale: Tensor  # (pose,) what they are divided by
+    poses: list[Tensor]  # by skill: (P, pose), in those units; none where nothing is known
+    radii: list[float]  # ε by skill
+
+    @classmethod
+    def of(cls, arrays: dict[str, np.ndarray]) -> Initiation:
+        """From what the artifact keeps: columns, scale, radii, and "poses.<skill>"."""
+        radii = arrays["radii"].tolist()
+        poses = [torch.from_numpy(arrays[f"poses.{skill}"]) for skill in range(len(radii))]
+        return cls(arrays["columns"].tolist(), torch.from_numpy(arrays["scale"]), poses, radii)
+
+    def distances(self, states: Tensor, skill: int) -> Tensor:
+        """To the nearest pose of the set: (..., observation) → (...); 0 where it is empty."""
+        poses = states[..., self.columns] / self.scale
+        if not len(self.poses[skill]):
+            return torch.zeros(poses.shape[:-1])
+        flat = torch.cdist(poses.flatten(0, -2), self.poses[skill])
+        return flat.amin(dim=1).unflatten(0, poses.shape[:-1])
+
+    def outside(self, states: Tensor, skill: int) -> Tensor:
+        """Which states are farther than ε from the set, (n, observation) → (n,) bool."""
+        return self.distances(states, skill) > self.radii[skill]
+
+
+@dataclass(frozen=True)
+class ReachStitch:
+    """Plan towards the next skill's initiation set; nothing where the robot is in it already.
+
+    A plan maximises E[−d(s')] − β·Var(T(s'|s, a)): Eq. 2 with the distance to the set in the place
+    of the value, s' being the state after the last action.
+    """
+
+    before_first: ClassVar[bool] = True
+    until_value_falls: ClassVar[bool] = False  # values know nothing of where no data are
+    initiation: Initiation
+    dynamics: Dynamics
+    planner: Planner
+    actions: ActionSpace
+    beta: float
+    norm: Norm
+    execute: int  # actions of each plan that are carried out
+    limit: int
+
+    def propose(
+        self,
+        states: Tensor,
+        previous: int | None,
+        following: int,
+        streams: Sequence[np.random.Generator],
+    ) -> Proposal:
+        outside = self.initiation.outside(states, following)
+        rows = outside.nonzero().flatten().tolist()
+        actions = np.zeros((len(states), self.execute, self.actions.size), dtype=np.float32)
+        if rows:
+            score = imagined(
+                states[rows], self.actions, partial(self._imagine, following=following)
+            )
+            plan = self.planner.plan(score, [streams[row] for row in rows], self.actions)
+            actions[rows] = plan.actions[:, : self.execute].numpy()
+        return Proposal(actions, outside.numpy())
+
+    def _imagine(self, starts: Tensor, sequences: Tensor, following: int) -> Tensor:
+        """The objective of sequences, (n, observation), (n, horizon, action) → (n,)."""
+        end = self.dynamics.imagine(starts, sequences)  # (D, n, observation)
+        nearness = -self.initiation.distances(end, following)  # (D, n)
+        return conservative_value(nearness, self.dynamics.scaled(end), 0.0, self.beta, self.norm)

@@ -1,0 +1,78 @@
+"""Initiation sets: where demonstrations that succeed begin, and how near is near enough."""
+
+import numpy as np
+import pytest
+from scipy.spatial.distance import cdist
+
+from stitching.data.initiation import BEGINNING, FINENESS, initiation_set, pose_scale
+from stitching.data.transitions import Transitions
+from stitching.envs.factors import Factors
+from stitching.streams import stream
+
+FACTORS = Factors(pose=(0, 2))
+STEPS, EPISODES = 10, 30
+
+
+def walks(spread: float, pace: float, successes: int = EPISODES) -> Transitions:
+    """Skill 0 from starts so far apart, moving so much a step; skill 1 fails throughout."""
+    rng = stream("walks")
+    starts = rng.normal(0, spread, (2 * EPISODES, 1, 3))
+    steps = rng.normal(0, pace, (2 * EPISODES, STEPS, 3)).cumsum(axis=1)
+    paths = np.concatenate([starts, starts + steps], axis=1).astype(np.float32)
+    done = np.arange(2 * EPISODES) < successes
+    return Transitions(
+        paths[:, :-1].reshape(-1, 3),
+        np.zeros((2 * EPISODES * STEPS, 1), dtype=np.float32),
+        paths[:, 1:].reshape(-1, 3),
+        STEPS * np.arange(1, 2 * EPISODES + 1),
+        np.repeat([0, 1], EPISODES),
+        done,
+    )
+
+
+def begun(data: Transitions, states: int) -> np.ndarray:
+    """The first poses of skill 0's demonstrations, in units of the scale."""
+    seen = data.observations.reshape(2 * EPISODES, STEPS, 3)[:EPISODES, :states, [0, 2]]
+    return seen.reshape(-1, 2) / pose_scale(data, FACTORS)
+
+
+def test_a_deviation_in_every_number_is_a_distance_of_one() -> None:
+    data = walks(1.0, 0.1)
+    deviation = data.observations.std(axis=0)[[0, 2]]
+    assert np.linalg.norm(deviation / pose_scale(data, FACTORS)) == pytest.approx(1.0, rel=1e-5)
+
+
+def test_the_set_covers_every_start_and_holds_nothing_else() -> None:
+    data = walks(1.0, 0.01)
+    found, starts = initiation_set(data, FACTORS, 0), begun(data, BEGINNING)
+    gaps = cdist(starts, found.poses)
+    assert gaps.min(axis=1).max() <= FINENESS * found.radius + 1e-6
+    assert gaps.min(axis=0).max() < 1e-6
+    between = cdist(found.poses, found.poses)
+    np.fill_diagonal(between, np.inf)
+    assert between.min() > FINENESS * found.radius
+    assert len(found.poses) < len(starts)
+
+
+def test_epsilon_is_how_near_demonstrations_begin_to_each_other() -> None:
+    data = walks(1.0, 0.01)
+    first = begun(data, 1)
+    apart = cdist(first, first)
+    np.fill_diagonal(apart, np.inf)
+    nearest = apart.min(axis=1)
+    radius = initiation_set(data, FACTORS, 0).radius
+    assert (nearest <= radius).mean() == pytest.approx(0.9, abs=1 / EPISODES)
+
+
+def test_epsilon_is_no_less_than_a_step() -> None:
+    data = walks(1e-3, 0.5)
+    moved = (data.next_observations - data.observations)[: EPISODES * STEPS, [0, 2]]
+    step = np.median(np.linalg.norm(moved / pose_scale(data, FACTORS), axis=1))
+    assert initiation_set(data, FACTORS, 0).radius == pytest.approx(step)
+
+
+@pytest.mark.parametrize(("skill", "successes"), [(1, EPISODES), (0, 1), (2, EPISODES)])
+def test_nothing_is_known_of_skills_that_hardly_succeed(skill: int, successes: int) -> None:
+    found = initiation_set(walks(1.0, 0.1, successes), FACTORS, skill)
+    assert found.poses.shape == (0, 2)
+    assert found.radius == np.inf

@@ -1,0 +1,82 @@
+"""Objects swapped in minibatches: only those that play no part, whole, and from one state."""
+
+import numpy as np
+import pytest
+
+from stitching.data.swapping import Swapping, bystanders
+from stitching.data.transitions import Transitions
+from stitching.envs.factors import NO_OBJECT, Factors
+from stitching.streams import stream
+
+# A robot (0), two numbers of a door (1, 3), one of a cup (2), and one that belongs to nothing.
+FACTORS = Factors((0,), {"door": (1, 3), "cup": (2,)}, own={"open": "door", "fill": "cup"})
+SKILLS = ("open", "fill", "wave")
+STEPS = 6
+
+
+def made_up(skill: int, moving: tuple[int, ...] = (), seed: int = 0) -> Transitions:
+    """One episode in which these columns move, and the others stand still somewhere."""
+    states = np.repeat(stream("start", skill, seed).normal(size=(1, 5)), STEPS + 1, axis=0)
+    states[:, list(moving)] += np.linspace(0, 3, STEPS + 1)[:, None]
+    states = states.astype(np.float32)
+    return Transitions(
+        states[:-1],
+        np.zeros((STEPS, 1), dtype=np.float32),
+        states[1:],
+        np.array([STEPS]),
+        np.array([skill]),
+        np.array([True]),
+    )
+
+
+def joined(*episodes: Transitions) -> Transitions:
+    columns = [episode.columns() for episode in episodes]
+    together = {name: np.concatenate([one[name] for one in columns]) for name in columns[0]}
+    together["episode_ends"] = STEPS * np.arange(1, len(episodes) + 1)
+    return Transitions(**together)
+
+
+DATA = joined(
+    made_up(0, (0, 1)),  # opens the door
+    made_up(0, (0, 1, 2), seed=1),  # opens the door, and moves the cup by accident
+    made_up(1, (0, 2)),  # fills the cup
+    made_up(2, (0,)),  # waves: neither object is its own
+    made_up(-1, (0,)),  # demonstrates nothing
+)
+
+
+def test_bystanders_stand_still_and_are_not_the_skills_own() -> None:
+    expected = [[False, True], [False, False], [True, False], [True, True], [False, False]]
+    assert bystanders(DATA, FACTORS, SKILLS).tolist() == expected
+
+
+def test_an_object_that_moves_in_the_last_step_alone_has_moved() -> None:
+    late = made_up(2, ())
+    late.next_observations[-1, 3] += 1
+    assert not bystanders(joined(late), FACTORS, SKILLS)[0, 0]
+
+
+def test_what_is_swapped_is_whole_and_from_one_state() -> None:
+    rows = np.arange(len(DATA)).repeat(200)
+    swapping = Swapping.of(DATA, FACTORS, SKILLS, 1.0)
+    swapped, donors = swapping.draw(rows, stream("swaps"))
+    assert swapped.shape == donors.shape == (len(rows), 5)
+    assert not swapped[:, [0, 4]].any()  # the robot, and what belongs to nothing
+    assert np.array_equal(swapped[:, 1], swapped[:, 3])
+    assert np.array_equal(donors[:, 1], donors[:, 3])
+    assert (donors[:, 1] != donors[:, 2]).any()
+    may = np.repeat(bystanders(DATA, FACTORS, SKILLS), STEPS, axis=0)[rows]
+    assert not swapped[:, [1, 2]][~may].any()
+    assert swapped[:, [1, 2]][may].mean() == pytest.approx(0.5, abs=0.03)
+    assert set(donors[:, 1]) == set(range(len(DATA)))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3])
+def test_so_many_transitions_have_swapped_objects(share: float) -> None:
+    rows = np.arange(3 * STEPS, 4 * STEPS).repeat(500)  # both objects are free
+    swapped, _ = Swapping.of(DATA, FACTORS, SKILLS, share).draw(rows, stream("swaps"))
+    assert swapped.any(axis=1).mean() == pytest.approx(0.75 * share, abs=0.02)
+
+
+def test_columns_know_their_objects() -> None:
+    assert FACTORS.object_of(5).tolist() == [NO_OBJECT, 0, 1, 0, NO_OBJECT]

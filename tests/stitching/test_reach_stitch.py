@@ -1,0 +1,90 @@
+"""Reach-Stitch: nothing where the robot is in the set, else plans towards it, at a price."""
+
+import numpy as np
+import torch
+
+from stitching.envs.protocol import ActionSpace
+from stitching.models.dynamics import Dynamics, DynamicsConfig
+from stitching.planning.cem import CEM
+from stitching.reach_stitch import Initiation, ReachStitch
+from stitching.streams import stream
+
+PLANE = ActionSpace(2, discrete=False)
+PLANNER = CEM(population=60, elites=10, horizon=2, iterations=40, momentum=0.5, tolerance=0.05)
+# The pose is (x, y), two numbers of three; the first skill begins at two places.
+SETS = Initiation(
+    columns=[0, 2],
+    scale=torch.tensor([2.0, 0.5]),
+    poses=[torch.tensor([[0.0, 0.0], [3.0, 0.0]]), torch.empty(0, 2)],
+    radii=[0.5, float("inf")],
+)
+
+
+def moves_by(*steps: np.ndarray) -> Dynamics:
+    """A linear ensemble: s' = s + a · B, one (2, 3) matrix B a member."""
+    weights = [np.concatenate([np.zeros((3, 3)), step]) for step in steps]
+    arrays = {
+        "observation_mean": np.zeros(3, dtype=np.float32),
+        "observation_std": np.ones(3, dtype=np.float32),
+        "t.w0": np.array(weights, dtype=np.float32),
+        "t.b0": np.zeros((len(steps), 1, 3), dtype=np.float32),
+    }
+    return Dynamics(arrays, DynamicsConfig())
+
+
+SURE = np.array([[0.2, 0.0, 0.0], [0.0, 0.0, 0.1]])  # an action moves x and y
+
+
+def reach(*steps: np.ndarray, beta: float = 0.0) -> ReachStitch:
+    dynamics = moves_by(*steps)
+    return ReachStitch(SETS, dynamics, PLANNER, PLANE, beta, "mean", execute=1, limit=20)
+
+
+def streams(n: int) -> list[np.random.Generator]:
+    return [stream("reach", i) for i in range(n)]
+
+
+def test_distances_are_to_the_nearest_pose_in_units_of_the_scale() -> None:
+    states = torch.tensor([[4.0, 9.0, 0.0], [0.0, 9.0, 1.0], [6.0, 0.0, 0.25]])
+    assert torch.allclose(SETS.distances(states, 0), torch.tensor([1.0, 2.0, 0.5]))
+    assert SETS.outside(states, 0).tolist() == [True, True, False]
+    stacked = states.expand(4, 3, 3)
+    assert torch.allclose(SETS.distances(stacked, 0), torch.tensor([1.0, 2.0, 0.5]).expand(4, 3))
+
+
+def test_where_nothing_is_known_nothing_is_done() -> None:
+    states = torch.full((3, 3), 100.0)
+    assert not reach(SURE).propose(states, 0, 1, streams(3)).wanted.any()
+
+
+def test_only_what_lies_outside_is_planned_for() -> None:
+    states = torch.tensor([[0.0, 0, 0], [2.0, 0, 0], [6.0, 0, 0]])
+    proposal = reach(SURE).propose(states, None, 0, streams(3))
+    assert proposal.wanted.tolist() == [False, True, False]
+    alone = reach(SURE).propose(states[1:2], None, 0, streams(3)[1:2])
+    assert np.array_equal(alone.actions[0], proposal.actions[1])
+
+
+def test_steps_lead_into_the_set() -> None:
+    stitcher = reach(SURE)
+    states = torch.tensor([[2.0, 0.0, 0.5], [4.5, 0.0, -0.5]])
+    before = SETS.distances(states, 0)
+    for _ in range(12):
+        proposal = stitcher.propose(states, None, 0, streams(2))
+        moved = torch.from_numpy(proposal.actions[:, 0]) @ torch.from_numpy(SURE).float()
+        states = torch.where(torch.from_numpy(proposal.wanted)[:, None], states + moved, states)
+    assert (SETS.distances(states, 0) < before).all()
+    assert not SETS.outside(states, 0).any()
+    assert states[:, 0].tolist() == sorted(states[:, 0].tolist())  # each at the place nearest to it
+
+
+def test_a_price_on_disagreement_keeps_plans_where_members_agree() -> None:
+    other = SURE.copy()
+    other[0, 1] = 2.0  # of what x's action does to a third number, members think differently
+    states = torch.tensor([[2.0, 0.0, 1.0]])
+    free, dear = (
+        reach(SURE, other, beta=beta).propose(states, None, 0, streams(1)).actions[0, 0]
+        for beta in (0.0, 10.0)
+    )
+    assert abs(dear[0]) < abs(free[0]) / 2
+    assert dear[1] < -0.3  # y is as sure as before
