@@ -7,6 +7,7 @@ from orchestrator.builders.maze import MAZE_BUILDERS
 from orchestrator.builders.parts import PLANNERS, Builder
 from orchestrator.builders.robosuite import ROBOSUITE_BUILDERS
 from orchestrator.builders.training import TRAINING_BUILDERS
+from orchestrator.methods import METHODS
 
 BUILDERS: dict[str, Builder] = (
     TRAINING_BUILDERS
@@ -17,12 +18,9 @@ BUILDERS: dict[str, Builder] = (
     | ANATOMY_BUILDERS
 )
 
-# What decides a block's outcome beside the models: Algorithm 1, the planners, what counts,
-BLOCK_CODE = (
-    "stitching.rollout",
-    "stitching.reach_stitch",
-    "stitching.envs.first_times",
-    *PLANNERS,
-)
+# What decides a block's outcome beside the models: Algorithm 1, every registered stitcher, the
+# planners, what counts,
+STITCHERS = tuple(sorted({method.stitcher.__module__ for method in METHODS.values()}))
+BLOCK_CODE = ("stitching.rollout", "stitching.envs.first_times", *STITCHERS, *PLANNERS)
 # and how they are set up, without the method's code that these import for other purposes.
 BLOCK_SETUP = ("orchestrator.builders.models", "orchestrator.methods", "orchestrator.worker")
