@@ -41,13 +41,15 @@ class MFStitchConfig:
     training: IQLConfig = IQLConfig()  # the extra policy, learned from it
 
 
-@dataclass(frozen=True)
-class PlanningConfig:
-    """How a method that plans searches."""
+PlannerName = Literal["random-shooting", "cem"]
 
-    planner: Literal["random-shooting", "cem"] = "cem"
-    random_shooting: RandomShooting = RandomShooting()
-    cem: CEM = CEM()
+
+class PlanningConfig:
+    """What settings of all methods that plan have in common; each declares its own defaults."""
+
+    planner: PlannerName
+    random_shooting: RandomShooting
+    cem: CEM
 
     @property
     def chosen(self) -> CEM | RandomShooting:
@@ -64,6 +66,9 @@ class MBStitchConfig(PlanningConfig):
     norm: Norm = "mean"  # how Eq. 2's second variance becomes a number
     selective: bool = False  # act only on plans that promise more than the present
     price: Price = "end"  # Var(T) of a plan: of its last state, or the mean over its steps
+    planner: PlannerName = "cem"
+    random_shooting: RandomShooting = RandomShooting()
+    cem: CEM = CEM()
 
 
 @dataclass(frozen=True)
@@ -72,6 +77,8 @@ class ReachStitchConfig(PlanningConfig):
     execute: int = 1  # actions of each plan carried out before planning again
     beta: float = 0.5  # β of Eq. 2, beside a distance in standard deviations
     norm: Norm = "mean"  # as MB-Stitch's
+    planner: PlannerName = "cem"
+    random_shooting: RandomShooting = RandomShooting()
     cem: CEM = CEM(iterations=40, momentum=0.5, tolerance=0.15)
 
 

@@ -20,7 +20,7 @@ Curves = dict[str, list[tuple[int, float]]]
 ARTIFACTS = {
     "mb-stitch": {"agent", "dynamics"},
     "mf-stitch": {"agent", "mf-policy"},
-    "reach-stitch": {"agent", "dynamics"},
+    "reach-stitch": {"agent", "dynamics", "initiation-sets"},
     "single-policy": {"single-policy"},
 }
 """What a method is played with, where that is not just the skills' agent."""

@@ -8,14 +8,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from stitching.data.transitions import Transitions
 from stitching.envs.factors import Factors
 from stitching.models.scale import observation_scale
 
 BEGINNING = 4  # states of a demonstration, from its first, that count as its start
-COVERED = 0.9  # share of the demonstrations whose start is within ε of another one's
+STEPS_NEAR = 2  # ε, in steps of the demonstrations: their median
 FINENESS = 0.25  # of ε: poses nearer than this to one that is kept are left out
 
 
@@ -23,8 +22,8 @@ FINENESS = 0.25  # of ε: poses nearer than this to one that is kept are left ou
 class InitiationSet:
     """Where one skill begins, as poses in units of `scale`, and how near is near enough.
 
-    A skill with fewer than two demonstrations that succeed has an empty set, and ε is infinite:
-    nothing is known of where it begins.
+    A skill without a demonstration that succeeds has an empty set, and ε is infinite: nothing is
+    known of where it begins.
     """
 
     poses: np.ndarray  # (P, pose) float32
@@ -45,10 +44,10 @@ def pose_scale(data: Transitions, factors: Factors) -> np.ndarray:
 def initiation_set(data: Transitions, factors: Factors, skill: int) -> InitiationSet:
     """The starts of a skill's demonstrations that succeeded, thinned.
 
-    ε is the distance from a demonstration's first pose to the nearest one of another demonstration
-    that 90 % do not exceed, or what the robot moves in one step of these data (their median) where
-    that is more: no stitch can be finer than a step. A pose is kept if it is farther than ε/4 from
-    all that were kept before it, in the dataset's order, so the set covers every start to ε/4.
+    ε is twice the median distance that the robot moves in one step of these demonstrations. (How
+    far their first poses lie from one another, the other measure at hand, says how sparse they
+    are, not where the skill works.) A pose is kept if it is farther than ε/4 from all that were
+    kept before it, in the dataset's order, so the set covers every start to ε/4.
     """
     shown = [
         rows
@@ -60,14 +59,11 @@ def initiation_set(data: Transitions, factors: Factors, skill: int) -> Initiatio
         if success
     ]
     scale, columns = pose_scale(data, factors), list(factors.pose)
-    if len(shown) < 2:
+    if not shown:
         return InitiationSet(np.empty((0, len(columns)), dtype=np.float32), np.inf)
-    first = data.observations[[rows[0] for rows in shown]][:, columns] / scale
     every = np.concatenate(shown)
     moves = (data.next_observations[every] - data.observations[every])[:, columns] / scale
-    apart = np.asarray(KDTree(first).query(first, k=2)[0])[:, 1]
-    step = float(np.median(np.linalg.norm(moves, axis=1)))
-    radius = max(float(np.quantile(apart, COVERED)), step)
+    radius = STEPS_NEAR * float(np.median(np.linalg.norm(moves, axis=1)))
     starts = np.concatenate([rows[:BEGINNING] for rows in shown])
     poses = data.observations[starts][:, columns] / scale
     return InitiationSet(_thinned(poses, FINENESS * radius), radius)
