@@ -10,7 +10,7 @@ from typing import Literal
 from orchestrator.jobs import BlockTask
 from orchestrator.kits import KITS
 from orchestrator.ledger import Ledger, Played
-from orchestrator.methods import method_rollout
+from orchestrator.methods import PlanningConfig, method_of, method_rollout
 from orchestrator.plan import Node, Plan
 from orchestrator.recipes import Recipe
 from orchestrator.spec import Spec
@@ -132,7 +132,8 @@ def seconds_each(task: BlockTask, history: Mapping[str, Played]) -> float:
     if task.kind in history:
         return history[task.kind].seconds_each
     costs = KITS[task.benchmark].costs
-    return costs.planned_segment if task.method == "mb-stitch" else costs.segment
+    plans = task.method and issubclass(method_of(task.method).config, PlanningConfig)
+    return costs.planned_segment if plans else costs.segment
 
 
 def _reference_seconds(recipe: Recipe) -> float:

@@ -227,10 +227,14 @@ def _check_methods(spec: Spec, where: str) -> None:
 
 def _check_swaps(spec: Spec, where: str) -> None:
     """Only where a row demonstrates one skill, among several objects, are there any to swap."""
-    learners = {"mf_stitch": spec.mf_stitch.training, "single_policy": spec.single_policy.training}
-    for name, training in learners.items():
-        if training.swap:
-            raise UsageError(f"{where}, {name}.training.swap: only agent.swap swaps objects")
+    learners: dict[str, MethodConfig] = {
+        "mf_stitch": spec.mf_stitch,
+        "single_policy": spec.single_policy,
+        **{method: spec.method_config(method) for method in spec.methods},
+    }
+    for name, config in learners.items():
+        if isinstance(config, MFStitchConfig | SinglePolicyConfig) and config.training.swap:
+            raise UsageError(f"{where}, {name}, training.swap: only agent.swap swaps objects")
     if not spec.agent.swap:
         return
     if len(BENCHMARKS[spec.benchmark].factors.objects) < 2:

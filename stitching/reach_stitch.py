@@ -14,7 +14,7 @@ from torch import Tensor
 from stitching.envs.protocol import ActionSpace
 from stitching.models.dynamics import Dynamics
 from stitching.planning.imagining import imagined
-from stitching.planning.objective import Norm, conservative_value
+from stitching.planning.objective import NORMS, Norm, spread_over_members
 from stitching.planning.protocol import Planner
 from stitching.stitchers import Proposal
 
@@ -40,7 +40,9 @@ class Initiation:
         poses = states[..., self.columns] / self.scale
         if not len(self.poses[skill]):
             return torch.zeros(poses.shape[:-1])
-        flat = torch.cdist(poses.flatten(0, -2), self.poses[skill])
+        # Without the matrix product, which is inexact near zero and taken by the number of rows.
+        exact = "donot_use_mm_for_euclid_dist"
+        flat = torch.cdist(poses.flatten(0, -2), self.poses[skill], compute_mode=exact)
         return flat.amin(dim=1).unflatten(0, poses.shape[:-1])
 
     def outside(self, states: Tensor, skill: int) -> Tensor:
@@ -52,8 +54,8 @@ class Initiation:
 class ReachStitch:
     """Plan towards the next skill's initiation set; nothing where the robot is in it already.
 
-    A plan maximises E[−d(s')] − β·Var(T(s'|s, a)): Eq. 2 with the distance to the set in the place
-    of the value, s' being the state after the last action.
+    A plan maximises E[−d(s')] − β·Var(T(s'|s, a)), s' being the state after the last action. Var(T)
+    is that of Eq. 2; E is the mean over the members of the dynamics, each at its own s'.
     """
 
     before_first: ClassVar[bool] = True
@@ -89,4 +91,5 @@ class ReachStitch:
         """The objective of sequences, (n, observation), (n, horizon, action) → (n,)."""
         end = self.dynamics.imagine(starts, sequences)  # (D, n, observation)
         nearness = -self.initiation.distances(end, following)  # (D, n)
-        return conservative_value(nearness, self.dynamics.scaled(end), 0.0, self.beta, self.norm)
+        price = NORMS[self.norm](spread_over_members(self.dynamics.scaled(end)))
+        return nearness.mean(dim=0) - self.beta * price

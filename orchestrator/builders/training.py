@@ -50,6 +50,10 @@ def _agent(params: Plain, inputs: Inputs) -> Artifact:
     experience = skill_experience(data, conditions(benchmark))
     actions, labels = benchmark.actions, _labels("agent", params)
     if not config.multi_task:
+        if config.swap:
+            raise NotImplementedError(
+                "networks of one skill each do not learn with objects swapped"
+            )
         return _trained(train_single_tasks(experience, actions, config, *labels))
     swapping = None
     if config.swap:

@@ -14,21 +14,23 @@ import numpy as np
 
 from stitching.data.transitions import Transitions
 from stitching.envs.factors import NO_OBJECT, Factors
+from stitching.models.scale import observation_scale
 
-STILL = 0.1  # standard deviations of the dataset: an object that moves by less stands still
+STILL = 0.1  # standard deviations of the dataset: a position that moves by less stands still
 EACH = 0.5  # share of the objects that may be swapped which are
 
 
 def bystanders(data: Transitions, factors: Factors, skills: Sequence[str]) -> np.ndarray:
     """Which objects play no part in each episode, (E, objects) bool.
 
-    Those that stand still throughout and are not what the demonstrated skill is about. None in an
-    episode that demonstrates no skill. skills: their names, as `episode_skills` numbers them.
+    Those whose positions stand still throughout and are not what the demonstrated skill is about.
+    None in an episode that demonstrates no skill. skills: their names, as `episode_skills` numbers
+    them.
     """
-    deviation = data.observations.std(axis=0, dtype=np.float64)
-    moved = _range(data) > STILL * deviation  # (E, observation)
-    columns = [list(own) for own in factors.objects.values()]
-    still = np.stack([~moved[:, own].any(axis=1) for own in columns], axis=1)
+    _, scale = observation_scale(data.observations)  # a number that only blurs has scale 1
+    moved = _range(data) > STILL * scale  # (E, observation)
+    positions = [list(factors.objects[name].positions) for name in factors.names]
+    still = np.stack([~moved[:, own].any(axis=1) for own in positions], axis=1)
     for episode, skill in enumerate(data.episode_skills.tolist()):
         if skill < 0:
             still[episode] = False

@@ -10,6 +10,18 @@ NO_OBJECT = -1
 
 
 @dataclass(frozen=True)
+class Object:
+    """One object's columns of an observation."""
+
+    positions: tuple[int, ...]
+    velocities: tuple[int, ...] = ()
+
+    @property
+    def columns(self) -> list[int]:
+        return [*self.positions, *self.velocities]
+
+
+@dataclass(frozen=True)
 class Factors:
     """Parts of an observation that can change one without the other.
 
@@ -17,13 +29,13 @@ class Factors:
     """
 
     pose: tuple[int, ...]  # columns that say where the robot is, velocities left out
-    objects: dict[str, tuple[int, ...]] = field(default_factory=dict)  # name → its own columns
+    objects: dict[str, Object] = field(default_factory=dict)  # by name
     own: dict[str, str] = field(default_factory=dict)  # skill → the object its goal is about
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The objects, in the order in which others number them."""
-        return tuple(self.objects)
+        """The objects in the order in which others number them, which no file's order decides."""
+        return tuple(sorted(self.objects))
 
     def object_of(self, size: int) -> np.ndarray:
         """The number of the object that each of `size` columns belongs to, (size,) int64.
@@ -31,6 +43,6 @@ class Factors:
         NO_OBJECT (−1) where a column belongs to none.
         """
         numbers = np.full(size, NO_OBJECT)
-        for number, columns in enumerate(self.objects.values()):
-            numbers[list(columns)] = number
+        for number, name in enumerate(self.names):
+            numbers[self.objects[name].columns] = number
         return numbers

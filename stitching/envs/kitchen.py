@@ -26,7 +26,7 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 
-from stitching.envs.factors import Factors
+from stitching.envs.factors import Factors, Object
 from stitching.envs.protocol import ActionSpace, Skill
 
 POSITIONS, VELOCITIES = 30, 29  # MuJoCo's nq and nv
@@ -87,6 +87,11 @@ RESETTING = [
 ]
 
 
+def _columns(numbers: range) -> tuple[int, ...]:
+    """Where an observation shows these of the positions and velocities joined."""
+    return tuple(np.flatnonzero(np.isin(SEEN, numbers)).tolist())
+
+
 @dataclass(frozen=True)
 class Kitchen:
     """The seven-skill kitchen, with how strongly its observations are blurred."""
@@ -111,11 +116,10 @@ class Kitchen:
         for name, (positions, _) in GOALS.items():
             # Velocities are numbered alike, but that the kettle has one fewer, and is the last.
             velocities = range(positions.start, min(positions.stop, VELOCITIES))
-            numbers = [
-                *range(positions.start, positions.stop),
-                *(POSITIONS + v for v in velocities),
-            ]
-            objects[name] = tuple(np.flatnonzero(np.isin(SEEN, numbers)).tolist())
+            moving = range(POSITIONS + velocities.start, POSITIONS + velocities.stop)
+            objects[name] = Object(
+                _columns(range(positions.start, positions.stop)), _columns(moving)
+            )
         return Factors(tuple(range(JOINTS)), objects, own={name: name for name in SKILLS})
 
     @cached_property

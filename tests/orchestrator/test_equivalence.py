@@ -14,14 +14,14 @@ from orchestrator.reproduce import Settings
 from orchestrator.spec import Spec
 from tests.orchestrator.tiny import Alone, Lines, Place, carry_out, promised_bytes, serially
 
-METHODS = ("no-stitch", "random-stitch", "mf-stitch", "mb-stitch")
+METHODS = ("no-stitch", "random-stitch", "mf-stitch", "mb-stitch", "reach-stitch")
 
 
 @pytest.fixture(scope="module", params=[False, True], ids=["between skills", "first, too"])
 def deep(spec: Spec, request: pytest.FixtureRequest) -> Spec:
     """Three skills deep, so that stitched segments have stitched parents."""
     rollout = replace(spec.rollout, first_stitch=request.param)
-    return replace(spec, lengths=(2, 3), tasks=(), rollout=rollout)
+    return replace(spec, methods=METHODS, lengths=(2, 3), tasks=(), rollout=rollout)
 
 
 @pytest.fixture(scope="module")
@@ -53,9 +53,11 @@ def test_the_problem_is_worth_comparing(serial: Place, deep: Spec) -> None:
     assert stitches["no-stitch"] == 0
     assert (segments["depth"] == 3).any()
     first = segments[segments["depth"] == 1]
-    own = {"random-stitch", "mb-stitch"} if deep.rollout.first_stitch else set()
+    stitched = {"random-stitch", "mb-stitch"} if deep.rollout.first_stitch else set()
+    # Reach-Stitch's first skills are its own, too, but every skill begins at the start cell.
+    own = {*stitched, "reach-stitch"} if stitched else set()
     assert set(first["method"]) == {"", *own}
-    assert set(first.loc[first["stitch_steps"] > 0, "method"]) == own
+    assert set(first.loc[first["stitch_steps"] > 0, "method"]) == stitched
 
 
 class Scrambled(SerialExecutor):
@@ -90,7 +92,7 @@ def test_blocks_taken_over_from_a_smaller_run(
 ) -> None:
     out, lines = done.root / "deep", Lines()
     carry_out(deep, serially(out, done.store_root), lines)
-    assert lines.phases["training"] == (8, 8)
+    assert lines.phases["training"] == (9, 9)
     assert lines.phases["illustrations"] == (1, 0)  # it shows a longer task
     assert promised_bytes(out) == expected
 

@@ -239,10 +239,11 @@ def test_a_block_of_nobody(benchmark: Benchmark) -> None:
 
 def test_factors_are_columns_of_the_observation_each_of_one_part(benchmark: Benchmark) -> None:
     factors, size = benchmark.factors, benchmark.observation_size
-    parts = [factors.pose, *factors.objects.values()]
+    objects = [factors.objects[name] for name in factors.names]
+    parts = [factors.pose, *(one.columns for one in objects)]
     columns = [column for part in parts for column in part]
     assert factors.pose
-    assert all(parts)
+    assert all(one.positions for one in objects)
     assert len(set(columns)) == len(columns)
     assert set(columns) <= set(range(size))
     assert set(factors.own) <= {skill.name for skill in benchmark.skills}

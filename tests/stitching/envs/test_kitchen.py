@@ -19,6 +19,7 @@ from gymnasium_robotics.envs.franka_kitchen.kitchen_env import (
     KitchenEnv,
 )
 
+from stitching.envs.factors import Object
 from stitching.envs.kitchen import (
     GOAL_RADIUS,
     GOALS,
@@ -485,11 +486,11 @@ def test_a_human_episode_equals_the_originals(episodes: Episodes, original: Kitc
 def test_an_objects_columns_are_its_joints_positions_and_velocities(skill: str) -> None:
     model = kitchen_model()
     seen = {number: column for column, number in enumerate(SEEN.tolist())}
-    columns = []
+    positions, velocities = [], []
     for joint in range(model.njnt):
         position, velocity = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
         if position in OBS_ELEMENT_INDICES[skill]:
             free = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
-            columns += [seen[position + i] for i in range(7 if free else 1)]
-            columns += [seen[model.nq + velocity + i] for i in range(6 if free else 1)]
-    assert sorted(columns) == list(KITCHEN.factors.objects[skill])
+            positions += [seen[position + i] for i in range(7 if free else 1)]
+            velocities += [seen[model.nq + velocity + i] for i in range(6 if free else 1)]
+    assert KITCHEN.factors.objects[skill] == Object(tuple(positions), tuple(velocities))
