@@ -1,4 +1,4 @@
-"""Reach-Stitch: lead the robot to where the next skill was demonstrated to begin."""
+"""Reach-Stitch: move the robot to where the next skill was demonstrated to begin."""
 
 from __future__ import annotations
 
