@@ -41,27 +41,32 @@ W = Waypoint
 BETWEEN, HELD = 0.025, 0.05
 
 
-def _door(pull: float) -> tuple[Waypoint, ...]:
-    """Take the handle's end between the fingers, turn it, and pull by so much (m) all the time."""
-    angles = (0.4, 0.8, 1.2, 1.4)  # rad, of the handle
-    lever = [(LEVER - LEVER * float(np.cos(a)), 0.0, -LEVER * float(np.sin(a))) for a in angles]
-    turning = [
-        W(at, CLOSED, a, patience=1, holding=HELD) for at, a in zip(lever, angles, strict=True)
+def _door(pull: float, turns: tuple[float, ...]) -> tuple[Waypoint, ...]:
+    """Take the handle's end between the fingers, turn it so far (rad, down is positive), then pull.
+
+    The pull (m, out of the door) goes on until the door is open or closed.
+    """
+    held = [
+        (LEVER - LEVER * float(np.cos(turn)), 0.0, -LEVER * float(np.sin(turn))) for turn in turns
     ]
-    x, _, z = lever[-1]
+    turning = [
+        W(at, CLOSED, turn, patience=1, holding=HELD) for at, turn in zip(held, turns, strict=True)
+    ]
+    x, _, z = held[-1]
     return (
         W((0.0, 0.2, 0.03), OPEN, near=0.05, patience=4),  # the hand swings round to face the door
         W((0.0, 0.1, 0.0), OPEN, near=0.03, patience=4),
         W((0.0, 0.0, 0.0), OPEN, near=BETWEEN, patience=8, loose=0.4),
         W((0.0, 0.0, 0.0), CLOSED, least=2, loose=0.4),
         *turning,
-        W((x, pull, z), CLOSED, angles[-1], near=0.0, patience=6, loose=0.4, holding=HELD),
+        W((x, pull, z), CLOSED, turns[-1], near=0.0, patience=6, loose=0.4, holding=HELD),
     )
 
 
 PROGRAMS: dict[str, tuple[Waypoint, ...]] = {
-    "open door": _door(0.06),
-    "close door": _door(-0.06),
+    "open door": _door(0.06, turns=(0.4, 0.8, 1.2, 1.4)),
+    # Closing lifts the handle: a handle turned down, as opening leaves it, is in none of its data.
+    "close door": _door(-0.06, turns=(-0.4, -0.8, -1.2, -1.55)),
     "can": (
         W((0.0, 0.0, 0.1), OPEN, near=0.03, patience=8),
         W((0.0, 0.0, 0.0), OPEN, near=BETWEEN, patience=8, loose=0.4),

@@ -1,6 +1,6 @@
 """What a setting of the data leaves to stitch: rates of the hands, and of policies they teach.
 
-    python -m stitching.data.robosuite.rates --task "open door,close door" --data.quality 0.05
+    python -m stitching.data.robosuite.rates --task "open door,close door" --data.quality 0.3
 
 Of No-Stitch alone: settings are chosen by these and never by how a stitcher fares on them.
 """
@@ -27,7 +27,7 @@ from stitching.stitchers import NoStitch
 @dataclass(frozen=True)
 class RatesConfig:
     task: str = "open door,close door"  # or "can,can"
-    data: RobosuiteDataConfig = RobosuiteDataConfig(episodes=200)
+    data: RobosuiteDataConfig = RobosuiteDataConfig(episodes=60)
     agent: IQLConfig = IQLConfig(width=128, policy_width=256, multi_task=False)
     seeds: int = 2  # trainings; one of them is one draw
     trials: int = 50  # of each rate

@@ -80,6 +80,18 @@ def test_closing_begins_at_an_open_door_and_opening_at_a_closed_one() -> None:
     assert min(hinges["close door"]) >= OPEN
 
 
+def test_opening_turns_the_handle_down_and_closing_lifts_it() -> None:
+    """So closing's data do not know the handle as opening leaves it."""
+    opening, closing = (
+        np.concatenate([one.observations[:, HANDLE_TURN] for one in shown(skill, EXPERT)])
+        for skill in ("open door", "close door")
+    )
+    assert opening.min() > -0.3
+    assert opening.max() > 1.2
+    assert closing.max() < 0.3
+    assert closing.min() < -1.2
+
+
 def test_demonstrations_end_with_success() -> None:
     for skill in ("open door", "close door"):
         for one in shown(skill, EXPERT):
