@@ -13,7 +13,7 @@ from stitching.data.transitions import Transitions
 from stitching.envs.factors import Factors
 from stitching.models.scale import observation_scale
 
-BEGINNING = 4  # states of a demonstration, from its first, that count as its start
+START = 1 / 3  # of the way, as far as the robot gets from where a demonstration begins
 STEPS_NEAR = 2  # ε, in steps of the demonstrations: their median
 FINENESS = 0.25  # of ε: poses nearer than this to one that is kept are left out
 
@@ -44,11 +44,14 @@ def pose_scale(data: Transitions, factors: Factors) -> np.ndarray:
 def initiation_set(data: Transitions, factors: Factors, skill: int) -> InitiationSet:
     """The starts of a skill's demonstrations that succeeded, thinned.
 
-    ε is twice the median distance that the robot moves in one step of these demonstrations. (How
-    far their first poses lie from one another, the other measure at hand, says how sparse they
-    are, not where the skill works.) A pose is kept if it is farther than ε/4 from all that were
-    kept before it, in the dataset's order, so the set covers every start to ε/4.
+    A demonstration's start is its states until its pose is farther from the first than START times
+    the farthest that it gets. ε is twice the median distance that the robot moves in one step of
+    these demonstrations: it is not sent nearer than it moves. (How far their first poses lie from
+    one another, the other measure at hand, says how sparse they are, not where the skill works.) A
+    pose is kept if it is farther than ε/4 from all that were kept before it, in the dataset's
+    order, so the set covers every start to ε/4.
     """
+    scale, columns = pose_scale(data, factors), list(factors.pose)
     shown = [
         rows
         for rows, success in zip(
@@ -58,15 +61,20 @@ def initiation_set(data: Transitions, factors: Factors, skill: int) -> Initiatio
         )
         if success
     ]
-    scale, columns = pose_scale(data, factors), list(factors.pose)
     if not shown:
         return InitiationSet(np.empty((0, len(columns)), dtype=np.float32), np.inf)
     every = np.concatenate(shown)
     moves = (data.next_observations[every] - data.observations[every])[:, columns] / scale
     radius = STEPS_NEAR * float(np.median(np.linalg.norm(moves, axis=1)))
-    starts = np.concatenate([rows[:BEGINNING] for rows in shown])
-    poses = data.observations[starts][:, columns] / scale
-    return InitiationSet(_thinned(poses, FINENESS * radius), radius)
+    starts = np.concatenate([_start(data.observations[rows][:, columns] / scale) for rows in shown])
+    return InitiationSet(_thinned(starts, FINENESS * radius), radius)
+
+
+def _start(path: np.ndarray) -> np.ndarray:
+    """The first poses of a demonstration, until START of its way: (T, pose) → (n, pose)."""
+    away = np.linalg.norm(path - path[0], axis=1)
+    begun: np.ndarray = path[np.logical_and.accumulate(away <= START * away.max())]
+    return begun
 
 
 def _thinned(poses: np.ndarray, gap: float) -> np.ndarray:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.distance import cdist
 
-from stitching.data.initiation import BEGINNING, FINENESS, initiation_set, pose_scale
+from stitching.data.initiation import FINENESS, START, initiation_set, pose_scale
 from stitching.data.transitions import Transitions
 from stitching.envs.factors import Factors
 from stitching.streams import stream
@@ -30,10 +30,22 @@ def walks(spread: float, pace: float, successes: int = EPISODES) -> Transitions:
     )
 
 
-def begun(data: Transitions, states: int) -> np.ndarray:
-    """The first poses of skill 0's demonstrations, in units of the scale."""
-    seen = data.observations.reshape(2 * EPISODES, STEPS, 3)[:EPISODES, :states, [0, 2]]
-    return seen.reshape(-1, 2) / pose_scale(data, FACTORS)
+def paths(data: Transitions) -> np.ndarray:
+    """The poses of skill 0's demonstrations, in units of the scale: (EPISODES, STEPS, 2)."""
+    seen = data.observations.reshape(2 * EPISODES, STEPS, 3)[:EPISODES, :, [0, 2]]
+    return seen / pose_scale(data, FACTORS)
+
+
+def starts(data: Transitions) -> np.ndarray:
+    """The poses of each demonstration before the robot has got START of its way: (n, 2)."""
+    begun = []
+    for path in paths(data):
+        gets = max(np.linalg.norm(pose - path[0]) for pose in path)
+        for pose in path:
+            if np.linalg.norm(pose - path[0]) > START * gets:
+                break
+            begun.append(pose)
+    return np.array(begun)
 
 
 def test_a_deviation_in_every_number_is_a_distance_of_one() -> None:
@@ -43,15 +55,17 @@ def test_a_deviation_in_every_number_is_a_distance_of_one() -> None:
 
 
 def test_the_set_covers_every_start_and_holds_nothing_else() -> None:
-    data = walks(1.0, 0.01)
-    found, starts = initiation_set(data, FACTORS, 0), begun(data, BEGINNING)
-    gaps = cdist(starts, found.poses)
+    data = walks(0.1, 0.1)
+    found = initiation_set(data, FACTORS, 0)
+    begun = starts(data)
+    assert EPISODES < len(begun) < EPISODES * STEPS
+    gaps = cdist(begun, found.poses)
     assert gaps.min(axis=1).max() <= FINENESS * found.radius + 1e-6
     assert gaps.min(axis=0).max() < 1e-6
     between = cdist(found.poses, found.poses)
     np.fill_diagonal(between, np.inf)
     assert between.min() > FINENESS * found.radius
-    assert len(found.poses) < len(starts)
+    assert len(found.poses) < len(begun)
 
 
 def test_epsilon_is_two_steps_of_the_skills_demonstrations() -> None:
@@ -59,6 +73,23 @@ def test_epsilon_is_two_steps_of_the_skills_demonstrations() -> None:
     moved = (data.next_observations - data.observations)[: EPISODES * STEPS, [0, 2]]
     step = np.median(np.linalg.norm(moved / pose_scale(data, FACTORS), axis=1))
     assert initiation_set(data, FACTORS, 0).radius == pytest.approx(2 * step)
+
+
+def test_a_start_is_a_share_of_the_way_however_many_steps_it_has() -> None:
+    """A robot that is told where to go twice as often begins and moves as before."""
+    data = walks(1.0, 0.01)
+    halfway = (data.observations + data.next_observations) / 2
+    often = Transitions(
+        np.stack([data.observations, halfway], axis=1).reshape(-1, 3),
+        np.repeat(data.actions, 2, axis=0),
+        np.stack([halfway, data.next_observations], axis=1).reshape(-1, 3),
+        2 * data.episode_ends,
+        data.episode_skills,
+        data.episode_successes,
+    )
+    once, twice = (initiation_set(one, FACTORS, 0) for one in (data, often))
+    assert cdist(once.poses, twice.poses).min(axis=1).max() <= once.radius / 2
+    assert cdist(twice.poses, once.poses).min(axis=1).max() <= once.radius
 
 
 @pytest.mark.parametrize(("skill", "successes"), [(1, EPISODES), (0, 0), (2, EPISODES)])
