@@ -10,7 +10,13 @@ from typing import Any
 import pandas as pd
 
 from analysis.figures import Drawn
-from analysis.page_studies import models_section, pairs_section, rates_section, stitches_section
+from analysis.page_studies import (
+    forecast_section,
+    models_section,
+    pairs_section,
+    rates_section,
+    stitches_section,
+)
 from analysis.page_tables import claims_html, gains_html, html_table, scores_html
 from analysis.profile_text import TITLE as PROFILE_TITLE
 from analysis.profile_text import profile_section
@@ -20,6 +26,7 @@ from analysis.tables import Table
 from analysis.verdicts import error_reading, explanation
 from analysis.writers import BOOTSTRAP, describe, seed_note
 
+OF_PAIRS = ("forecast",)
 OF_MODELS = ("diagnosis", "diagnosis-values")
 OF_STITCHES = ("anatomy",)
 """Figures that stand beside what they are about, and not with those of the whole run."""
@@ -56,12 +63,17 @@ def render_page(
             "".join(
                 _figure(figure, figures)
                 for figure in drawn
-                if not figure.table and figure.name not in OF_MODELS + OF_STITCHES
+                if not figure.table and figure.name not in OF_PAIRS + OF_MODELS + OF_STITCHES
             ),
         ),
         "profile": (PROFILE_TITLE, profile_section(studies.get("profile"), run.spec)),
         "rates": ("What there is to stitch", rates_section(studies.get("rates"))),
         "pairs": ("Pairs of skills", pairs_section(run, studies.get("pair-groups"))),
+        "forecast": (
+            "Pairs foretold",
+            forecast_section(studies.get("forecast"))
+            + "".join(_figure(figure, figures) for figure in drawn if figure.name in OF_PAIRS),
+        ),
         "models": (
             "Are the models right?",
             models_section(run, studies.get("models"))

@@ -7,6 +7,7 @@ from html import escape
 import pandas as pd
 
 from analysis.anatomy import FIRST_SKILLS, HAND_OVERS, OUTCOMES, WARNINGS, by_kind, label
+from analysis.forecast import FORECAST_NOTE, agreement, agreement_text
 from analysis.page_tables import html_table
 from analysis.pairs import BASELINE, shown_orders
 from analysis.rates import HEADER, NOTE, rate_lines
@@ -72,6 +73,12 @@ def _gain(row: Record, name: str) -> str:
 
 def _unbroken(text: str) -> str:
     return text.replace(" ", "\N{NO-BREAK SPACE}")
+
+
+def forecast_section(table: pd.DataFrame | None) -> str:
+    """How the forecast of pairs did; nothing where there is none, or too little was played."""
+    found = None if table is None else agreement(table)
+    return "" if found is None else _note(f"{FORECAST_NOTE} {agreement_text(found)}")
 
 
 def rates_section(rates: pd.DataFrame | None) -> str:

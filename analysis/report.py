@@ -11,6 +11,7 @@ from analysis.anatomy import anatomy_table, stitch_table
 from analysis.episodes import write_episodes
 from analysis.figures import Drawn, draw_figures
 from analysis.files import replaced_folder
+from analysis.forecast import forecast_table
 from analysis.models import model_table
 from analysis.page import render_page
 from analysis.pairs import both_skills, pair_groups, pair_table, second_skills, shown_orders
@@ -115,6 +116,9 @@ def _studies(run: Run) -> Studies:
         studies["profile"] = beside_table_8
     if run.diagnosis:
         studies["models"] = model_table(run)
+    foretold = forecast_table(run)
+    if not foretold.empty:
+        studies["forecast"] = foretold
     if run.diagnoses:
         studies["rates"] = rate_table(run)
     if run.anatomy:

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -139,16 +140,16 @@ def _plan(words: list[str]) -> None:
     from orchestrator.costs import estimate
     from orchestrator.ledger import Ledger
     from orchestrator.plan import make_plan
-    from orchestrator.printing import plan_lines, suite_plan_lines
+    from orchestrator.printing import forecast_lines, plan_lines, suite_plan_lines
     from orchestrator.store import Store
 
     command, asked = _with_spec(PlanCommand, "plan", words)
     if isinstance(asked, Suite):
         lines = suite_plan_lines(asked, command.store, command.workers)
     else:
-        look = Ledger.look(command.store / "blocks.sqlite")
-        costs = estimate(make_plan(asked), Store(command.store), look)
-        lines = plan_lines(asked, costs, command.workers)
+        plan, store = make_plan(asked), Store(command.store)
+        costs = estimate(plan, store, Ledger.look(command.store / "blocks.sqlite"))
+        lines = chain(plan_lines(asked, costs, command.workers), forecast_lines(plan, store))
     for line in lines:
         OUTPUT.print(line, markup=False)
 

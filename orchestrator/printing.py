@@ -10,7 +10,7 @@ from pathlib import Path
 from orchestrator.costs import Estimate, estimate
 from orchestrator.ledger import Ledger
 from orchestrator.methods import method_label
-from orchestrator.plan import make_plan
+from orchestrator.plan import Plan, make_plan
 from orchestrator.rundir import RunDirectory
 from orchestrator.spec import Spec
 from orchestrator.store import Store
@@ -47,6 +47,29 @@ def plan_lines(spec: Spec, costs: Estimate, workers: int | None) -> Iterator[str
     yield f"to be played: about {costs.segments_missing:,} segments"
     yield _time_line([costs], workers)
     yield _disk_line([costs])
+
+
+def forecast_lines(plan: Plan, store: Store) -> Iterator[str]:
+    """Second skills as the diagnosis in the store foretells them; nothing where there is none."""
+    kind, key = "", plan.illustrations.get("diagnosis", "")
+    if key:
+        kind = plan.recipes[key].kind
+    if (kind, key) not in store:
+        return
+    foretold = {
+        (pair["first"], pair["second"]): pair["success"]
+        for pair in store.read(kind, key).info.get("forecast", [])
+    }
+    if not foretold:
+        return
+    skills = list(dict.fromkeys(skill for pair in foretold for skill in pair))
+    width = max(map(len, skills))
+    yield "foretold: how often each second skill works after each first, without a stitch"
+    yield f"  {'':<{width}}  " + "  ".join(f"{skill:>{width}}" for skill in skills)
+    for first in skills:
+        rates = [foretold.get((first, second)) for second in skills]
+        cells = [f"{'' if rate is None else f'{rate:.2f}':>{width}}" for rate in rates]
+        yield f"  {first:<{width}}  " + "  ".join(cells)
 
 
 def _time_line(costs: list[Estimate], workers: int | None) -> str:

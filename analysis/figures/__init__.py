@@ -7,10 +7,12 @@ from analysis.figures.anatomy import draw_anatomy
 from analysis.figures.curves import draw_curves
 from analysis.figures.diagnosis import draw_predictions, draw_value_curves
 from analysis.figures.drawn import Drawn
+from analysis.figures.forecast import draw_forecast
 from analysis.figures.pairs import draw_pairs
 from analysis.figures.scores import draw_scores
 from analysis.figures.showcases import draw_showcases
 from analysis.figures.style import house_style, save
+from analysis.forecast import forecast_table
 from analysis.pairs import shown_orders, shown_pairs
 from analysis.run import Run
 from analysis.tables import Table
@@ -39,6 +41,10 @@ def draw_figures(run: Run, tables: list[Table], folder: Path) -> list[Drawn]:
             notes = [(FRAMED, framed), (OWN_FIRSTS, run.spec.own_first_skill & {*pair})]
             caption = PAIRS_CAPTION + "".join(note for note, needed in notes if needed)
             drawn.append(Drawn("pairs", caption, ""))
+        foretold = forecast_table(run)
+        if foretold["trials"].any():
+            save(draw_forecast(foretold, run.spec), folder, "forecast")
+            drawn.append(Drawn("forecast", FORECAST_CAPTION, ""))
         drawn += _diagnosis(run, folder)
         if any(begun(study) for study in run.anatomy.values()):
             save(draw_anatomy(run.anatomy), folder, "anatomy")
@@ -54,6 +60,11 @@ PAIRS_CAPTION = (
 )
 FRAMED = " Framed: pairs that occur in the data, one right after the other."
 OWN_FIRSTS = " Each method's second skills follow its own first ones, so episodes differ."
+FORECAST_CAPTION = (
+    "How often the second skill succeeds once the first has, without a stitch. Left: foretold from "
+    "held-out demonstrations by the first seed's models. Right: foretold and played, one circle a "
+    "pair, all seeds, the larger the more trials; on the dashed line both are equal."
+)
 PREDICTIONS_CAPTION = (
     "Predictions of the dynamics on held-out demonstrations. Left: root mean square error over "
     "the distance moved; 1 (dashed) is no better than predicting that nothing moves. Right: the "

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 from matplotlib.patches import Rectangle
 
 from analysis.figures.style import INK, new_figure
@@ -33,33 +34,39 @@ def draw_pairs(
 
     `framed` are the pairs (first, second) to put a frame around.
     """
-    names = [spec.skill_label(skill) for skill in spec.skills]
-    size = 1.3 + 0.46 * len(names)
+    size = 1.3 + 0.46 * len(spec.skills)
     figure = new_figure(2 * size + 1.2, size + 0.6)
     panels = figure.subplots(1, 2)
     for axes, method in zip(panels, methods, strict=True):
-        rates = pair_rates(segments, spec, method)
-        image = axes.imshow(rates, vmin=0, vmax=1, cmap="cividis")
-        for (row, column), rate in np.ndenumerate(rates):
-            dark = rate < 0.5
-            text = "" if np.isnan(rate) else f"{rate:.2f}"
-            axes.text(column, row, text, ha="center", va="center", fontsize=7.5,
-                      color="white" if dark else INK)  # fmt: skip
+        image = draw_matrix(axes, pair_rates(segments, spec, method), spec)
         _frame(axes, spec, framed)
         axes.set_title(spec.methods[method])
-        axes.set_xticks(range(len(names)), names)
-        if max(map(len, names)) > 4:
-            axes.tick_params(axis="x", labelrotation=40)
-            for label in axes.get_xticklabels():
-                label.set(ha="right", rotation_mode="anchor")
-        axes.set_yticks(range(len(names)), names if axes is panels[0] else [])
-        axes.tick_params(length=0)
-        axes.spines[:].set_visible(False)
-        axes.set_xlabel("second skill")
+    panels[1].set_yticks(range(len(spec.skills)), [])
     panels[0].set_ylabel("first skill, accomplished")
     bar = figure.colorbar(image, ax=panels, shrink=0.8, label="success of the second skill")
     bar.outline.set_visible(False)
     return figure
+
+
+def draw_matrix(axes: Axes, rates: np.ndarray, spec: RunSpec) -> AxesImage:
+    """Rates (first, second) in [0, 1], each with its number; NaN stays empty."""
+    names = [spec.skill_label(skill) for skill in spec.skills]
+    image = axes.imshow(rates, vmin=0, vmax=1, cmap="cividis")
+    for (row, column), rate in np.ndenumerate(rates):
+        dark = rate < 0.5
+        text = "" if np.isnan(rate) else f"{rate:.2f}"
+        axes.text(column, row, text, ha="center", va="center", fontsize=7.5,
+                  color="white" if dark else INK)  # fmt: skip
+    axes.set_xticks(range(len(names)), names)
+    if max(map(len, names)) > 4:
+        axes.tick_params(axis="x", labelrotation=40)
+        for label in axes.get_xticklabels():
+            label.set(ha="right", rotation_mode="anchor")
+    axes.set_yticks(range(len(names)), names)
+    axes.tick_params(length=0)
+    axes.spines[:].set_visible(False)
+    axes.set_xlabel("second skill")
+    return image
 
 
 def _frame(axes: Axes, spec: RunSpec, pairs: Collection[tuple[str, str]]) -> None:

@@ -45,6 +45,7 @@ def _diagnosis(params: Plain, inputs: Inputs) -> Artifact:
 
 DATA = ("stitching.data.kitchen.demonstrations",)
 SHOWN = ("stitching.showcase.physics", *PLANNERS)
+JUDGED = ("stitching.diagnosis", "stitching.forecast")
 SETUP = ("orchestrator.builders.kitchen", "orchestrator.builders.parts")
 
 KITCHEN_BUILDERS = {
@@ -52,5 +53,5 @@ KITCHEN_BUILDERS = {
     "kitchen-human": Builder(_human, ("stitching.data.kitchen.human",), SETUP),
     "kitchen-held-out": Builder(_held_out, DATA, SETUP),
     "kitchen-showcase": Builder(_showcase, SHOWN, (*SETUP, *LOOKING)),
-    "kitchen-diagnosis": Builder(_diagnosis, ("stitching.diagnosis",), (*SETUP, *LOOKING)),
+    "kitchen-diagnosis": Builder(_diagnosis, JUDGED, (*SETUP, *LOOKING)),
 }

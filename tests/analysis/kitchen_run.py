@@ -161,6 +161,12 @@ def kitchen_files() -> dict[str, Any]:
             "competence": {
                 skill: {"trials": 100, "successes": 97, "steps": 50.0} for skill in SKILLS
             },
+            "forecast": [
+                {"first": first, "second": second, "distance": abs(near - 1.0), "success": near}
+                for near, (first, second) in zip(
+                    np.linspace(0.9, 0.05, 12).tolist(), permutations(SKILLS, 2), strict=True
+                )
+            ],
         },
     }  # fmt: skip
 

@@ -1,0 +1,67 @@
+"""Pairs foretold from held-out demonstrations."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stitching.data.transitions import Transitions
+from stitching.envs.kitchen import KITCHEN
+from stitching.envs.maze import Maze
+from stitching.forecast import pair_forecast
+from stitching.models.scale import observation_scale
+
+NAMES = [skill.name for skill in KITCHEN.skills]
+FIRST, SECOND, THIRD = NAMES[:3]
+OWN = {skill: {"successes": 3, "trials": 4} for skill in NAMES}
+POSE = KITCHEN.factors.pose[0]
+SHUT = KITCHEN.factors.objects["hinge cabinet"].positions[0]
+UNSEEN = KITCHEN.factors.objects["kettle"].velocities[0]
+STARTS = {FIRST: (0.0, 0.0), SECOND: (1.0, 0.0), THIRD: (1.0, 3.0)}  # of pose and object
+ENDS = {FIRST: (1.0, 0.0), SECOND: (5.0, 0.0), THIRD: (0.0, 0.0)}
+
+
+def shown() -> Transitions:
+    """Two demonstrations of each of three skills, of one step each, that differ in a velocity."""
+    skills = np.repeat(np.arange(3), 2)
+    states = np.zeros((2, len(skills), KITCHEN.observation_size), dtype=np.float32)
+    for row, skill in enumerate(skills):
+        for moment, places in zip(states, (STARTS, ENDS), strict=True):
+            moment[row, [POSE, SHUT]] = places[NAMES[skill]]
+            moment[row, UNSEEN] = row
+    return Transitions(
+        observations=states[0],
+        actions=np.zeros((len(skills), KITCHEN.actions.size), dtype=np.float32),
+        next_observations=states[1],
+        episode_ends=np.arange(1, len(skills) + 1),
+        episode_skills=skills,
+        episode_successes=np.ones(len(skills), dtype=bool),
+    )
+
+
+def test_a_pair_without_a_gap_works_as_often_as_the_second_skill_alone() -> None:
+    data = shown()
+    foretold = {(one["first"], one["second"]): one for one in pair_forecast(KITCHEN, data, OWN)}
+    assert foretold[FIRST, SECOND]["distance"] == 0
+    assert foretold[FIRST, SECOND]["success"] == pytest.approx(3 / 4)
+    columns = KITCHEN.factors.configuration
+    deviation = observation_scale(data.observations)[1]
+    gap = 3 / deviation[SHUT] / len(columns) ** 0.5  # the third's object stands elsewhere
+    assert foretold[FIRST, THIRD]["distance"] == pytest.approx(gap, rel=1e-5)
+    assert foretold[FIRST, THIRD]["success"] == pytest.approx(3 / 4 * np.exp(-gap), rel=1e-5)
+
+
+def test_every_ordered_pair_of_skills_that_were_shown_and_succeeded() -> None:
+    data = shown()
+    assert len(pair_forecast(KITCHEN, data, OWN)) == 3 * 2
+    missed = replace(data, episode_successes=data.episode_skills != 2)
+    assert {one["second"] for one in pair_forecast(KITCHEN, missed, OWN)} == {FIRST, SECOND}
+    untried = {skill: OWN[skill] for skill in (FIRST, SECOND)}
+    assert {one["second"] for one in pair_forecast(KITCHEN, data, untried)} == {FIRST, SECOND}
+
+
+def test_nothing_is_foretold_where_no_objects_are_told_apart(
+    maze: Maze, demonstrations: Transitions
+) -> None:
+    own = {skill.name: {"successes": 1, "trials": 1} for skill in maze.skills}
+    assert pair_forecast(maze, demonstrations, own) == []
