@@ -3,14 +3,16 @@
 import json
 import shutil
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, permutations
 
 import pandas as pd
 import pytest
 
 from orchestrator.methods import SinglePolicyConfig
 from orchestrator.plan import Plan, make_plan
+from orchestrator.printing import forecast_lines
 from orchestrator.spec import Spec, load_spec
+from orchestrator.store import Store
 from stitching.anatomy import START
 from stitching.data.kitchen.demonstrations import KitchenDataConfig
 from stitching.data.kitchen.segments import Order
@@ -86,13 +88,17 @@ def test_long_tasks_played_without_the_tree(played: tuple[Plan, Place], method: 
 
 
 def test_the_run_tells_of_pairs_and_models(played: tuple[Plan, Place]) -> None:
-    _, place = played
+    plan, place = played
     pairs = pd.read_csv(place.out / "report" / "pairs.csv")
     shown = pairs[pairs["in_data"]]
     known = set(zip(shown["first"], shown["second"], strict=True))
     assert known <= set(pairwise(ORDER))
     diagnosis = json.loads((place.out / "diagnosis.json").read_text())
     assert diagnosis["competence"].keys() == set(ORDER)
+    foretold = {(pair["first"], pair["second"]) for pair in diagnosis["forecast"]}
+    assert foretold == set(permutations(ORDER, 2))
+    told = list(forecast_lines(plan, Store(place.store_root)))
+    assert [line.split("  ")[1] for line in told[2:]] == list(diagnosis["competence"])
     assert all(skill["rank_correlation"] > 0.8 for skill in diagnosis["values"].values())
     assert diagnosis["predictions"]["5"]["groups"]["arm positions"]["relative"] < 1
     for table in ("table2", "table8"):

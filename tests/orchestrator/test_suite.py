@@ -217,9 +217,11 @@ def test_what_is_known_of_models_is_kept_by_part(tmp_path: Path) -> None:
     study = {
         "predictions": {"1": {}},
         **{name: {"g0": 1} for name in ("values", "prices", "competence")},
+        "forecast": [{"first": "g0", "second": "g1", "success": 0.5}],
     }
     renamed = diagnosis_of_part(study, Naming(suite, suite.parts[0]))
     assert renamed["predictions"] == {"1": {}}
+    assert renamed["forecast"] == [{"first": "short:g0", "second": "short:g1", "success": 0.5}]
     assert all(renamed[name] == {"short:g0": 1} for name in ("values", "prices", "competence"))
     earlier = {name: found for name, found in study.items() if name != "prices"}
     del renamed["prices"]
