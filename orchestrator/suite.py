@@ -35,6 +35,7 @@ class PartFields:
     label: str  # its row where rows are variants, and the name of its folder
     base: str = ""  # another spec, by name or file; empty: the suite's own fields alone
     settings: dict[str, Any] = field(default_factory=dict)  # over the base's fields
+    scales: dict[str, dict[str, Any]] = field(default_factory=dict)  # over these, by scale
 
 
 @dataclass(frozen=True)
@@ -145,14 +146,18 @@ def load_asked(name_or_file: str, scale: Scale = "paper") -> Spec | Suite:
 
 
 def _part_spec(entry: PartFields, content: Plain, scale: Scale, folder: Path, where: str) -> Spec:
-    """The base's fields, over them those of the suite's file, over them the part's settings."""
+    """The base's fields, over them those of the suite's file, over them the part's settings.
+
+    Of the part's settings those of the scale come last.
+    """
     where = f"{where}, part {entry.label}"
-    if foreign := [name for name in NOT_OF_A_PART if name in entry.settings]:
+    settings = merged(entry.settings, entry.scales.get(scale, {}))
+    if foreign := [name for name in NOT_OF_A_PART if name in settings]:
         raise UsageError(f"{where}, settings: {foreign[0]!r} is the suite's; set it there")
     shared = {name: value for name, value in content.items() if name not in OWN_FIELDS}
     shared["base"] = entry.base
     fields = based_fields(shared, scale, PACKAGED, folder, where)
-    fields = merged(fields, entry.settings)
+    fields = merged(fields, settings)
     fields |= {"name": f"{content['name']}-{entry.label}"}
     fields |= {"title": f"{content['title']}: {entry.label}"}
     return spec_from_plain(fields, where)

@@ -62,6 +62,18 @@ def lists(folder: Path) -> Suite:
     return suite
 
 
+def test_a_part_may_have_settings_of_its_own_at_a_scale(tmp_path: Path) -> None:
+    file = tmp_path / "scaled.toml"
+    scaled = '[[parts]]\nlabel = "long"\nscales = { smoke = { episodes = 3 } }'
+    content = OTHER_TASKS.replace("BASE", str(TINY)).replace('[[parts]]\nlabel = "long"', scaled)
+    file.write_text(content.replace("seeds = 1", "seeds = 1\nepisodes = 3", 1))
+    for scale, seeds in (("smoke", 1), ("paper", 1)):
+        suite = load_asked(str(file), scale)
+        assert isinstance(suite, Suite)
+        assert [part.spec.episodes for part in suite.parts] == [3, 3]
+        assert {part.spec.seeds for part in suite.parts} == {seeds}
+
+
 @pytest.fixture(autouse=True)
 def no_figures() -> Iterator[None]:
     with mock.patch("analysis.report.draw_figures", return_value=[]):
