@@ -9,8 +9,15 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from stitching.data.transitions import Transitions
+from stitching.envs.factors import Factors
 from stitching.envs.protocol import Benchmark
 from stitching.models.scale import observation_scale
+
+
+def configuration(factors: Factors) -> list[int]:
+    """Columns that say where everything is: the robot's pose and all objects' positions."""
+    positions = [column for name in factors.names for column in factors.objects[name].positions]
+    return [*factors.pose, *positions]
 
 
 def pair_forecast(
@@ -26,12 +33,9 @@ def pair_forecast(
     deviation in the held-out data. Nothing here was fitted to a pair.
 
     Without a stitch. A pair is left out if either skill has no held-out demonstration that
-    succeeds. Empty for a benchmark whose observations have no objects told apart: there the
-    configuration is not known. Each entry has first, second, distance (the median of d), success.
+    succeeds. Each entry has first, second, distance (the median of d) and success.
     """
-    if not benchmark.factors.objects:
-        return []
-    columns = benchmark.factors.configuration
+    columns = configuration(benchmark.factors)
     _, deviation = observation_scale(data.observations)
     scale = deviation[columns] * np.float32(len(columns) ** 0.5)
     last = data.episode_ends - 1

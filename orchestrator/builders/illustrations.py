@@ -13,7 +13,6 @@ from stitching.data.transitions import Transitions
 from stitching.diagnosis import competence, prediction_errors, prices, value_progress
 from stitching.envs.protocol import Benchmark
 from stitching.envs.registry import BENCHMARKS
-from stitching.forecast import pair_forecast
 from stitching.rollout import RolloutConfig
 from stitching.showcase.shown import Shown
 
@@ -47,11 +46,11 @@ def diagnosis(
     data = Transitions(**columns)
     rollout = structure(RolloutConfig, params["rollout"], "rollout")
     seeds = params["root_seed"], params["seed"]
-    own = competence(agent, benchmark, rollout, params["step_limit"], data, starts, *seeds)
     return {
         "predictions": prediction_errors(dynamics, data, groups, params["horizon"]),
         "values": value_progress(agent, benchmark, data),
         "prices": prices(agent, dynamics, benchmark, data, params["horizon"]),
-        "competence": own,
-        "forecast": pair_forecast(benchmark, data, own),
+        "competence": competence(
+            agent, benchmark, rollout, params["step_limit"], data, starts, *seeds
+        ),
     }

@@ -9,7 +9,9 @@ from orchestrator.structure import Plain, structure
 from stitching.data.kitchen.demonstrations import KitchenDataConfig, held_out, kept, play
 from stitching.data.kitchen.human import human_demonstrations
 from stitching.data.kitchen.segments import Segment, as_transitions, shown_orders
+from stitching.data.transitions import Transitions
 from stitching.envs.kitchen import GROUPS, KITCHEN
+from stitching.forecast import pair_forecast
 from stitching.showcase.physics import physics_showcase
 
 
@@ -40,7 +42,10 @@ def _showcase(params: Plain, inputs: Inputs) -> Artifact:
 
 
 def _diagnosis(params: Plain, inputs: Inputs) -> Artifact:
-    return Artifact({}, diagnosis(KITCHEN, GROUPS, params, inputs))
+    study = diagnosis(KITCHEN, GROUPS, params, inputs)
+    held = {name: held for name, held in inputs["held-out"].arrays.items() if name != "starts"}
+    foretold = pair_forecast(KITCHEN, Transitions(**held), study["competence"])
+    return Artifact({}, study | {"forecast": foretold})
 
 
 DATA = ("stitching.data.kitchen.demonstrations",)

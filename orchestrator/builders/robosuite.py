@@ -37,12 +37,11 @@ def _diagnosis(params: Plain, inputs: Inputs) -> Artifact:
 
 DATA = ("stitching.data.robosuite.demonstrations",)
 SHOWN = ("stitching.showcase.physics", *PLANNERS)
-JUDGED = ("stitching.diagnosis", "stitching.forecast")
 SETUP = ("orchestrator.builders.robosuite", "orchestrator.builders.parts")
 
 ROBOSUITE_BUILDERS = {
     "robosuite-demonstrations": Builder(_demonstrations, DATA, SETUP),
     "robosuite-held-out": Builder(_held_out, DATA, SETUP),
     "robosuite-showcase": Builder(_showcase, SHOWN, (*SETUP, *LOOKING)),
-    "robosuite-diagnosis": Builder(_diagnosis, JUDGED, (*SETUP, *LOOKING)),
+    "robosuite-diagnosis": Builder(_diagnosis, ("stitching.diagnosis",), (*SETUP, *LOOKING)),
 }

@@ -37,12 +37,6 @@ class Factors:
         """The objects in the order in which others number them, which no file's order decides."""
         return tuple(sorted(self.objects))
 
-    @property
-    def configuration(self) -> list[int]:
-        """Columns that say where everything is: the pose and all objects' positions."""
-        positions = [column for name in self.names for column in self.objects[name].positions]
-        return [*self.pose, *positions]
-
     def object_of(self, size: int) -> np.ndarray:
         """The number of the object that each of `size` columns belongs to, (size,) int64.
 

@@ -7,8 +7,7 @@ import pytest
 
 from stitching.data.transitions import Transitions
 from stitching.envs.kitchen import KITCHEN
-from stitching.envs.maze import Maze
-from stitching.forecast import pair_forecast
+from stitching.forecast import configuration, pair_forecast
 from stitching.models.scale import observation_scale
 
 NAMES = [skill.name for skill in KITCHEN.skills]
@@ -44,7 +43,7 @@ def test_a_pair_without_a_gap_works_as_often_as_the_second_skill_alone() -> None
     foretold = {(one["first"], one["second"]): one for one in pair_forecast(KITCHEN, data, OWN)}
     assert foretold[FIRST, SECOND]["distance"] == 0
     assert foretold[FIRST, SECOND]["success"] == pytest.approx(3 / 4)
-    columns = KITCHEN.factors.configuration
+    columns = configuration(KITCHEN.factors)
     deviation = observation_scale(data.observations)[1]
     gap = 3 / deviation[SHUT] / len(columns) ** 0.5  # the third's object stands elsewhere
     assert foretold[FIRST, THIRD]["distance"] == pytest.approx(gap, rel=1e-5)
@@ -58,10 +57,3 @@ def test_every_ordered_pair_of_skills_that_were_shown_and_succeeded() -> None:
     assert {one["second"] for one in pair_forecast(KITCHEN, missed, OWN)} == {FIRST, SECOND}
     untried = {skill: OWN[skill] for skill in (FIRST, SECOND)}
     assert {one["second"] for one in pair_forecast(KITCHEN, data, untried)} == {FIRST, SECOND}
-
-
-def test_nothing_is_foretold_where_no_objects_are_told_apart(
-    maze: Maze, demonstrations: Transitions
-) -> None:
-    own = {skill.name: {"successes": 1, "trials": 1} for skill in maze.skills}
-    assert pair_forecast(maze, demonstrations, own) == []
