@@ -1,4 +1,4 @@
-"""Success of second skills as it was foretold (stitching.forecast), beside what was played."""
+"""The forecast of second skills (stitching.forecast) beside what was played."""
 
 from __future__ import annotations
 
@@ -15,10 +15,12 @@ COLUMNS = [
 ]  # fmt: skip
 
 FORECAST_NOTE = (
-    "Before a pair is played, its second skill is foretold to succeed as often as from its own "
-    "held-out starts, times the mean of exp(−d) over the states in which held-out demonstrations "
-    "of the first skill succeed: d is the distance to the nearest held-out start of the second, "
-    "1 where the robot's pose and all objects' positions differ by a standard deviation each."
+    "No pair that was played goes into the forecast: a second skill succeeds as often as from its "
+    "own held-out starts, times the mean of exp(−d) over the states in which held-out "
+    "demonstrations of the first skill succeed: d is the distance to the nearest held-out start of the second, "
+    "1 where the robot's pose and all objects' positions differ by a standard deviation each. "
+    "Demonstrations of the first skill may have moved other objects before; where a pair is "
+    "played, nothing came before it."
 )
 
 

@@ -70,7 +70,7 @@ def render_page(
         "rates": ("What there is to stitch", rates_section(studies.get("rates"))),
         "pairs": ("Pairs of skills", pairs_section(run, studies.get("pair-groups"))),
         "forecast": (
-            "Pairs foretold",
+            "A forecast of pairs",
             forecast_section(studies.get("forecast"))
             + "".join(_figure(figure, figures) for figure in drawn if figure.name in OF_PAIRS),
         ),

@@ -235,16 +235,17 @@ def diagnosis_of_part(study: Plain, naming: Naming) -> Plain:
 
     Parts that were diagnosed by an earlier version lack what it did not measure.
     """
-    renamed = {
+    renamed: Plain = {
         name: {naming.skill(skill): found for skill, found in study[name].items()}
         for name in ("values", "prices", "competence")
         if name in study
     }
-    forecast = [
-        pair | {place: naming.skill(pair[place]) for place in ("first", "second")}
-        for pair in study.get("forecast", [])
-    ]
-    return study | renamed | {"forecast": forecast}
+    if "forecast" in study:
+        renamed["forecast"] = [
+            pair | {place: naming.skill(pair[place]) for place in ("first", "second")}
+            for pair in study["forecast"]
+        ]
+    return study | renamed
 
 
 def showcase_of_part(showcase: Plain, naming: Naming) -> Plain:

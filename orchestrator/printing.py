@@ -13,7 +13,7 @@ from orchestrator.methods import method_label
 from orchestrator.plan import Plan, make_plan
 from orchestrator.rundir import RunDirectory
 from orchestrator.spec import Spec
-from orchestrator.store import Store
+from orchestrator.store import CorruptArtifactError, Store
 from orchestrator.suite import Suite, part_directories
 
 
@@ -50,24 +50,26 @@ def plan_lines(spec: Spec, costs: Estimate, workers: int | None) -> Iterator[str
 
 
 def forecast_lines(plan: Plan, store: Store) -> Iterator[str]:
-    """Second skills as the diagnosis in the store foretells them; nothing where there is none."""
+    """The forecast of pairs in the store's diagnosis; nothing where there is none."""
     kind, key = "", plan.illustrations.get("diagnosis", "")
     if key:
         kind = plan.recipes[key].kind
     if (kind, key) not in store:
         return
-    foretold = {
-        (pair["first"], pair["second"]): pair["success"]
-        for pair in store.read(kind, key).info.get("forecast", [])
-    }
-    if not foretold:
+    try:
+        pairs = store.read(kind, key).info.get("forecast", [])
+    except CorruptArtifactError as error:
+        yield f"forecast: {error}"
         return
-    skills = list(dict.fromkeys(skill for pair in foretold for skill in pair))
+    forecast = {(pair["first"], pair["second"]): pair["success"] for pair in pairs}
+    if not forecast:
+        return
+    skills = list(dict.fromkeys(skill for pair in forecast for skill in pair))
     width = max(map(len, skills))
-    yield "foretold: how often each second skill works after each first, without a stitch"
+    yield "forecast: how often each second skill works after each first, without a stitch"
     yield f"  {'':<{width}}  " + "  ".join(f"{skill:>{width}}" for skill in skills)
     for first in skills:
-        rates = [foretold.get((first, second)) for second in skills]
+        rates = [forecast.get((first, second)) for second in skills]
         cells = [f"{'' if rate is None else f'{rate:.2f}':>{width}}" for rate in rates]
         yield f"  {first:<{width}}  " + "  ".join(cells)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from analysis.run import plain_label
 from orchestrator.errors import UsageError
@@ -151,6 +151,10 @@ def _part_spec(entry: PartFields, content: Plain, scale: Scale, folder: Path, wh
     Of the part's settings those of the scale come last.
     """
     where = f"{where}, part {entry.label}"
+    if unknown := [name for name in entry.scales if name not in get_args(Scale)]:
+        raise UsageError(
+            f"{where}: no scale {unknown[0]!r}; there are {', '.join(get_args(Scale))}"
+        )
     settings = merged(entry.settings, entry.scales.get(scale, {}))
     if foreign := [name for name in NOT_OF_A_PART if name in settings]:
         raise UsageError(f"{where}, settings: {foreign[0]!r} is the suite's; set it there")

@@ -1,4 +1,4 @@
-"""Which pairs of skills will work, foretold from held-out demonstrations before one is played."""
+"""A forecast of which pairs of skills work, from held-out demonstrations alone."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def configuration(factors: Factors) -> list[int]:
 def pair_forecast(
     benchmark: Benchmark, data: Transitions, competence: Mapping[str, Mapping[str, Any]]
 ) -> list[dict[str, Any]]:
-    """How often the second skill of each ordered pair will succeed where the first one did.
+    """How often the second skill of each ordered pair will succeed once the first one has.
 
     P(B | A) = c(B) · mean over e of exp(−d(e, B)): c(B) is how often B's policy succeeds from its
     own held-out starts (`stitching.diagnosis.competence`), e runs over the states in which A's
@@ -32,8 +32,10 @@ def pair_forecast(
     (the robot's pose and the positions of all objects), each number in units of its standard
     deviation in the held-out data. Nothing here was fitted to a pair.
 
-    Without a stitch. A pair is left out if either skill has no held-out demonstration that
-    succeeds. Each entry has first, second, distance (the median of d) and success.
+    Without a stitch. A's demonstrations may have moved other objects before A, and e has them as
+    they are then; where a pair is played, nothing came before A. A pair is left out if either
+    skill has no held-out demonstration that succeeds. Each entry has first, second, distance (the
+    median of d) and success.
     """
     columns = configuration(benchmark.factors)
     _, deviation = observation_scale(data.observations)

@@ -1,4 +1,4 @@
-"""Pairs of skills as they were foretold, and as they came."""
+"""The forecast of pairs of skills, beside what was played."""
 
 import numpy as np
 import pandas as pd
@@ -11,28 +11,33 @@ from analysis.run import RunSpec
 
 
 def draw_forecast(table: pd.DataFrame, spec: RunSpec) -> Figure:
-    """Left the matrix foretold, right each played pair's rate against its forecast.
+    """Left the forecast, right each played pair's rate against its forecast.
 
     table: `analysis.forecast.forecast_table`.
     """
     size = 1.3 + 0.46 * len(spec.skills)
     figure = new_figure(2 * size + 1.2, size + 0.6)
     left, right = figure.subplots(1, 2)
-    foretold = table.set_index(["first", "second"])["forecast"].to_dict()
+    forecast = table.set_index(["first", "second"])["forecast"].to_dict()
     matrix = np.array(
-        [[foretold.get((first, second), np.nan) for second in spec.skills] for first in spec.skills]
+        [[forecast.get((first, second), np.nan) for second in spec.skills] for first in spec.skills]
     )
     draw_matrix(left, matrix, spec)
     left.set_ylabel("first skill, accomplished")
-    left.set_title("Foretold")
+    left.set_title("Forecast")
     _calibration(right, table[table["trials"] > 0])
     return figure
 
 
 def _calibration(axes: Axes, played: pd.DataFrame) -> None:
     axes.plot([0, 1], [0, 1], ls="--", lw=1, color=INK)
-    axes.scatter(played["forecast"], played["rate"], s=6 + 2 * played["trials"], alpha=0.6)
+    axes.scatter(
+        played["forecast"],
+        played["rate"],
+        s=6 + 60 * played["trials"] / played["trials"].max(),
+        alpha=0.6,
+    )
     axes.set(xlim=(-0.03, 1.03), ylim=(-0.03, 1.03), aspect="equal")
-    axes.set_xlabel("foretold")
+    axes.set_xlabel("forecast")
     axes.set_ylabel("played, without a stitch")
-    axes.set_title("Foretold and played")
+    axes.set_title("Forecast and played")

@@ -48,7 +48,7 @@ def test_nothing_is_said_of_too_little() -> None:
 
 def test_the_report_has_a_section_a_figure_and_a_table(tmp_path: Path, write_run: Any) -> None:
     page = build_report(write_kitchen(write_run, tmp_path / "run"))
-    assert "Pairs foretold" in page.read_text()
+    assert "A forecast of pairs" in page.read_text()
     assert len(pd.read_csv(page.parent / "forecast.csv")) == 12
     assert (page.parent / "figures" / "forecast.svg").is_file()
 
@@ -57,5 +57,5 @@ def test_a_run_without_a_forecast_has_none(tmp_path: Path, write_run: Any) -> No
     files = kitchen_files()
     del files["diagnosis"]["forecast"]
     page = build_report(write_kitchen(write_run, tmp_path / "run", **files))
-    assert "Pairs foretold" not in page.read_text()
+    assert "A forecast of pairs" not in page.read_text()
     assert not (page.parent / "forecast.csv").exists()

@@ -24,6 +24,7 @@ from orchestrator.merge import (
 from orchestrator.progress import Silent
 from orchestrator.reproduce_suite import reproduce_suite
 from orchestrator.rundir import RunDirectory
+from orchestrator.structure import to_plain
 from orchestrator.suite import Suite, load_asked, part_directory
 from tests.orchestrator.tiny import TINY, promised_bytes, serially
 
@@ -64,14 +65,17 @@ def lists(folder: Path) -> Suite:
 
 def test_a_part_may_have_settings_of_its_own_at_a_scale(tmp_path: Path) -> None:
     file = tmp_path / "scaled.toml"
-    scaled = '[[parts]]\nlabel = "long"\nscales = { smoke = { episodes = 3 } }'
-    content = OTHER_TASKS.replace("BASE", str(TINY)).replace('[[parts]]\nlabel = "long"', scaled)
-    file.write_text(content.replace("seeds = 1", "seeds = 1\nepisodes = 3", 1))
-    for scale, seeds in (("smoke", 1), ("paper", 1)):
+    content = SUITE.read_text().replace('base = "tiny"', f'base = "{TINY}"')
+    scales = "scales = { smoke = { data = { episodes = 3 } } }"
+    asked = "settings = { data = { episodes = 6 } }"
+    file.write_text(content.replace(asked, f"{asked}\n{scales}"))
+    for scale, episodes in (("smoke", 3), ("paper", 6)):
         suite = load_asked(str(file), scale)
         assert isinstance(suite, Suite)
-        assert [part.spec.episodes for part in suite.parts] == [3, 3]
-        assert {part.spec.seeds for part in suite.parts} == {seeds}
+        assert to_plain(suite.parts[0].spec.data)["episodes"] == episodes
+    file.write_text(content.replace(asked, scales.replace("smoke", "smok")))
+    with pytest.raises(UsageError, match="no scale 'smok'"):
+        load_asked(str(file))
 
 
 @pytest.fixture(autouse=True)

@@ -50,6 +50,32 @@ def test_a_pair_without_a_gap_works_as_often_as_the_second_skill_alone() -> None
     assert foretold[FIRST, THIRD]["success"] == pytest.approx(3 / 4 * np.exp(-gap), rel=1e-5)
 
 
+def test_each_end_is_measured_to_its_nearest_start_and_then_averaged() -> None:
+    """Three demonstrations of the first skill, of two steps; the one that failed does not count."""
+    poses = [[0, 8, 1], [0, 8, 4], [0, 8, 9], [2, 8, 8], [5, 8, 8]]  # of each: before, between, end
+    states = np.zeros((5, 3, KITCHEN.observation_size), dtype=np.float32)
+    states[:, :, POSE] = poses
+    data = Transitions(
+        observations=states[:, :2].reshape(10, -1),
+        actions=np.zeros((10, KITCHEN.actions.size), dtype=np.float32),
+        next_observations=states[:, 1:].reshape(10, -1),
+        episode_ends=np.arange(2, 12, 2),
+        episode_skills=np.array([0, 0, 0, 1, 1]),
+        episode_successes=np.array([True, True, False, True, True]),
+    )
+    unit = np.std([0, 8, 0, 8, 0, 8, 2, 8, 5, 8]) * len(configuration(KITCHEN.factors)) ** 0.5
+    (found,) = [one for one in pair_forecast(KITCHEN, data, OWN) if one["first"] == FIRST]
+    # From 1 to the start at 2, and from 4 to the one at 5.
+    assert found["distance"] == pytest.approx(1 / unit, rel=1e-5)
+    assert found["success"] == pytest.approx(3 / 4 * np.exp(-1 / unit), rel=1e-5)
+    states[1, 2, POSE] = 7
+    farther = replace(data, next_observations=states[:, 1:].reshape(10, -1))
+    (found,) = [one for one in pair_forecast(KITCHEN, farther, OWN) if one["first"] == FIRST]
+    both = (np.exp(-1 / unit) + np.exp(-2 / unit)) / 2
+    assert found["success"] == pytest.approx(3 / 4 * both, rel=1e-5)
+    assert found["distance"] == pytest.approx(1.5 / unit, rel=1e-5)
+
+
 def test_every_ordered_pair_of_skills_that_were_shown_and_succeeded() -> None:
     data = shown()
     assert len(pair_forecast(KITCHEN, data, OWN)) == 3 * 2
