@@ -17,8 +17,9 @@ COLUMNS = [
 FORECAST_NOTE = (
     "No pair that was played goes into the forecast: a second skill succeeds as often as from its "
     "own held-out starts, times the mean of exp(−d) over the states in which held-out "
-    "demonstrations of the first skill succeed: d is the distance to the nearest held-out start of the second, "
-    "1 where the robot's pose and all objects' positions differ by a standard deviation each. "
+    "demonstrations of the first skill succeed: d is the distance to the nearest held-out "
+    "start of the second, 1 where the robot's pose and all objects' positions differ by a "
+    "standard deviation each. "
     "Demonstrations of the first skill may have moved other objects before; where a pair is "
     "played, nothing came before it."
 )

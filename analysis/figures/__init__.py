@@ -63,7 +63,8 @@ OWN_FIRSTS = " Each method's second skills follow its own first ones, so episode
 FORECAST_CAPTION = (
     "How often the second skill succeeds once the first has, without a stitch. Left: the "
     "forecast from held-out demonstrations by the first seed's models. Right: forecast and "
-    "played, one circle a pair, all seeds, the larger the more trials; on the dashed line both are equal."
+    "played, one circle a pair, all seeds, the larger the more trials; on the "
+    "dashed line both are equal."
 )
 PREDICTIONS_CAPTION = (
     "Predictions of the dynamics on held-out demonstrations. Left: root mean square error over "
