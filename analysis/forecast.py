@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from analysis.pairs import BASELINE, second_skills
+from analysis.pairs import BASELINE, pair_counts, second_skills
 from analysis.run import Run
 
 COLUMNS = [
@@ -32,12 +32,10 @@ def forecast_table(run: Run) -> pd.DataFrame:
     Empty for a run that was merged from several, or without a forecast.
     """
     foretold = [] if run.spec.parts else run.diagnosis.get("forecast", [])
-    seconds = second_skills(run.segments, run.spec)
-    plain = seconds[seconds["method"] == BASELINE].groupby(["first", "second"])["success"]
-    counts = {pair: (int(part.sum()), len(part)) for pair, part in plain}
+    counts = pair_counts(second_skills(run.segments, run.spec)) if foretold else {}
     rows = []
     for pair in foretold:
-        wins, trials = counts.get((pair["first"], pair["second"]), (0, 0))
+        wins, trials = counts.get((pair["first"], pair["second"], BASELINE), (0, 0))
         rate = wins / trials if trials else np.nan
         rows.append(
             [pair["first"], pair["second"], pair["distance"], pair["success"], wins, trials, rate]

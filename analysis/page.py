@@ -71,18 +71,15 @@ def render_page(
         "pairs": ("Pairs of skills", pairs_section(run, studies.get("pair-groups"))),
         "forecast": (
             "A forecast of pairs",
-            forecast_section(studies.get("forecast"))
-            + "".join(_figure(figure, figures) for figure in drawn if figure.name in OF_PAIRS),
+            forecast_section(studies.get("forecast")) + _named(OF_PAIRS, drawn, figures),
         ),
         "models": (
             "Are the models right?",
-            models_section(run, studies.get("models"))
-            + "".join(_figure(figure, figures) for figure in drawn if figure.name in OF_MODELS),
+            models_section(run, studies.get("models")) + _named(OF_MODELS, drawn, figures),
         ),
         "stitches": (
             "When does stitching hurt?",
-            stitches_section(run, studies)
-            + "".join(_figure(figure, figures) for figure in drawn if figure.name in OF_STITCHES),
+            stitches_section(run, studies) + _named(OF_STITCHES, drawn, figures),
         ),
         "skills": ("Single skills", _single_skills(run)),
         "every-task": ("Every permutation", _permutation_section(run)),
@@ -162,6 +159,10 @@ def _table_section(table: Table, drawn: list[Drawn], figures: Path) -> str:
             gains_html(table),
         ]
     )
+
+
+def _named(names: tuple[str, ...], drawn: list[Drawn], folder: Path) -> str:
+    return "".join(_figure(figure, folder) for figure in drawn if figure.name in names)
 
 
 def _figure(figure: Drawn, folder: Path) -> str:

@@ -1,6 +1,6 @@
 """Ordered pairs of skills: those shown together in the data, and those never seen in a row."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from itertools import pairwise
 from typing import Any
 
@@ -76,6 +76,12 @@ def both_skills(
     )
 
 
+def pair_counts(seconds: pd.DataFrame) -> dict[tuple[Hashable, ...], tuple[int, int]]:
+    """Successes and trials of second skills by (first, second, method)."""
+    played = seconds.groupby(["first", "second", "method"])["success"]
+    return {pair: (int(part.sum()), len(part)) for pair, part in played}
+
+
 def pair_table(
     seconds: pd.DataFrame, both: pd.DataFrame, orders: Orders, spec: RunSpec
 ) -> pd.DataFrame:
@@ -86,7 +92,7 @@ def pair_table(
     """
     shown = shown_pairs(orders)
     key = ["first", "second", "method"]
-    counts = {pair: (int(part.sum()), len(part)) for pair, part in seconds.groupby(key)["success"]}
+    counts = pair_counts(seconds)
     wholes = {pair: (len(part), part.mean()) for pair, part in both.groupby(key)["accomplished"]}
     unknown = 0, np.nan
     records = [

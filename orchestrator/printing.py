@@ -51,13 +51,11 @@ def plan_lines(spec: Spec, costs: Estimate, workers: int | None) -> Iterator[str
 
 def forecast_lines(plan: Plan, store: Store) -> Iterator[str]:
     """The forecast of pairs in the store's diagnosis; nothing where there is none."""
-    kind, key = "", plan.illustrations.get("diagnosis", "")
-    if key:
-        kind = plan.recipes[key].kind
-    if (kind, key) not in store:
+    key = plan.illustrations.get("diagnosis")
+    if key is None or (plan.recipes[key].kind, key) not in store:
         return
     try:
-        pairs = store.read(kind, key).info.get("forecast", [])
+        pairs = store.read(plan.recipes[key].kind, key).info.get("forecast", [])
     except CorruptArtifactError as error:
         yield f"forecast: {error}"
         return

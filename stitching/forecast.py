@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from scipy.spatial.distance import cdist
 
+from stitching.data.initiation import distance_scale
 from stitching.data.transitions import Transitions
 from stitching.envs.factors import Factors
 from stitching.envs.protocol import Benchmark
-from stitching.models.scale import observation_scale
 
 
 def configuration(factors: Factors) -> list[int]:
@@ -38,16 +38,14 @@ def pair_forecast(
     median of d) and success.
     """
     columns = configuration(benchmark.factors)
-    _, deviation = observation_scale(data.observations)
-    scale = deviation[columns] * np.float32(len(columns) ** 0.5)
+    scale = distance_scale(data, columns)
     last = data.episode_ends - 1
-    names = [skill.name for skill in benchmark.skills]
     starts, ends = {}, {}
-    for index, name in enumerate(names):
+    for index, skill in enumerate(benchmark.skills):
         own = (data.episode_skills == index) & data.episode_successes
         if own.any():
-            starts[name] = data.observations[data.episode_starts[own]][:, columns] / scale
-            ends[name] = data.next_observations[last[own]][:, columns] / scale
+            starts[skill.name] = data.observations[data.episode_starts[own]][:, columns] / scale
+            ends[skill.name] = data.next_observations[last[own]][:, columns] / scale
     forecast = []
     for first in ends:
         for second in starts:

@@ -5,8 +5,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.figures.pairs import draw_matrix
-from analysis.figures.style import INK, new_figure
+from analysis.figures.pairs import draw_matrix, two_panels
+from analysis.figures.style import INK
 from analysis.run import RunSpec
 
 
@@ -15,9 +15,7 @@ def draw_forecast(table: pd.DataFrame, spec: RunSpec) -> Figure:
 
     table: `analysis.forecast.forecast_table`.
     """
-    size = 1.3 + 0.46 * len(spec.skills)
-    figure = new_figure(2 * size + 1.2, size + 0.6)
-    left, right = figure.subplots(1, 2)
+    figure, (left, right) = two_panels(spec)
     forecast = table.set_index(["first", "second"])["forecast"].to_dict()
     matrix = np.array(
         [[forecast.get((first, second), np.nan) for second in spec.skills] for first in spec.skills]

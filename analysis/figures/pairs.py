@@ -34,9 +34,7 @@ def draw_pairs(
 
     `framed` are the pairs (first, second) to put a frame around.
     """
-    size = 1.3 + 0.46 * len(spec.skills)
-    figure = new_figure(2 * size + 1.2, size + 0.6)
-    panels = figure.subplots(1, 2)
+    figure, panels = two_panels(spec)
     for axes, method in zip(panels, methods, strict=True):
         image = draw_matrix(axes, pair_rates(segments, spec, method), spec)
         _frame(axes, spec, framed)
@@ -46,6 +44,13 @@ def draw_pairs(
     bar = figure.colorbar(image, ax=panels, shrink=0.8, label="success of the second skill")
     bar.outline.set_visible(False)
     return figure
+
+
+def two_panels(spec: RunSpec) -> tuple[Figure, np.ndarray]:
+    """A figure with room for two matrices of the spec's skills, and its axes (2,)."""
+    size = 1.3 + 0.46 * len(spec.skills)
+    figure = new_figure(2 * size + 1.2, size + 0.6)
+    return figure, figure.subplots(1, 2)
 
 
 def draw_matrix(axes: Axes, rates: np.ndarray, spec: RunSpec) -> AxesImage:

@@ -30,15 +30,20 @@ class InitiationSet:
     radius: float  # ε: a pose this near to one of the set is in it
 
 
-def pose_scale(data: Transitions, factors: Factors) -> np.ndarray:
-    """What the numbers of a pose are divided by, (pose,) float32.
+def distance_scale(data: Transitions, columns: list[int]) -> np.ndarray:
+    """What these columns of an observation are divided by before distances, (columns,) float32.
 
     Their standard deviation over the dataset, times the square root of how many there are: two
-    poses that differ by one standard deviation in every number are at a Euclidean distance of 1.
+    states that differ by one standard deviation in every number are at a Euclidean distance of 1.
     """
     _, deviation = observation_scale(data.observations)
-    scale: np.ndarray = deviation[list(factors.pose)] * np.float32(len(factors.pose) ** 0.5)
+    scale: np.ndarray = deviation[columns] * np.float32(len(columns) ** 0.5)
     return scale
+
+
+def pose_scale(data: Transitions, factors: Factors) -> np.ndarray:
+    """`distance_scale` of the numbers of a pose, (pose,) float32."""
+    return distance_scale(data, list(factors.pose))
 
 
 def initiation_set(data: Transitions, factors: Factors, skill: int) -> InitiationSet:

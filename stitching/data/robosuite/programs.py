@@ -65,7 +65,7 @@ def _door(pull: float, turns: tuple[float, ...]) -> tuple[Waypoint, ...]:
 
 PROGRAMS: dict[str, tuple[Waypoint, ...]] = {
     "open door": _door(0.06, turns=(0.4, 0.8, 1.2, 1.4)),
-    # Closing lifts the handle: a handle turned down, as opening leaves it, is in none of its data.
+    # Closing lifts the handle: one turned down, as opening leaves it, is in hardly any of its data.
     "close door": _door(-0.06, turns=(-0.4, -0.8, -1.2, -1.55)),
     "can": (
         W((0.0, 0.0, 0.1), OPEN, near=0.03, patience=8),
