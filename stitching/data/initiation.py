@@ -71,12 +71,17 @@ def initiation_set(data: Transitions, factors: Factors, skill: int) -> Initiatio
     every = np.concatenate(shown)
     moves = (data.next_observations[every] - data.observations[every])[:, columns] / scale
     radius = STEPS_NEAR * float(np.median(np.linalg.norm(moves, axis=1)))
-    starts = np.concatenate([_start(data.observations[rows][:, columns] / scale) for rows in shown])
+    starts = np.concatenate([_start(_path(data, rows)[:, columns] / scale) for rows in shown])
     return InitiationSet(_thinned(starts, FINENESS * radius), radius)
 
 
+def _path(data: Transitions, rows: np.ndarray) -> np.ndarray:
+    """All states of the demonstration in these rows, the last included: (T + 1, observation)."""
+    return np.concatenate([data.observations[rows], data.next_observations[rows[-1:]]])
+
+
 def _start(path: np.ndarray) -> np.ndarray:
-    """The first poses of a demonstration, until START of its way: (T, pose) → (n, pose)."""
+    """The first poses of a demonstration, until START of its way: (T + 1, pose) → (n, pose)."""
     away = np.linalg.norm(path - path[0], axis=1)
     begun: np.ndarray = path[np.logical_and.accumulate(away <= START * away.max())]
     return begun

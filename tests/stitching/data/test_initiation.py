@@ -31,9 +31,11 @@ def walks(spread: float, pace: float, successes: int = EPISODES) -> Transitions:
 
 
 def paths(data: Transitions) -> np.ndarray:
-    """The poses of skill 0's demonstrations, in units of the scale: (EPISODES, STEPS, 2)."""
-    seen = data.observations.reshape(2 * EPISODES, STEPS, 3)[:EPISODES, :, [0, 2]]
-    return seen / pose_scale(data, FACTORS)
+    """The poses of skill 0's demonstrations, in units of the scale: (EPISODES, STEPS + 1, 2)."""
+    shape = (2 * EPISODES, STEPS, 3)
+    seen, then = data.observations.reshape(shape), data.next_observations.reshape(shape)
+    whole = np.concatenate([seen, then[:, -1:]], axis=1)
+    return whole[:EPISODES, :, [0, 2]] / pose_scale(data, FACTORS)
 
 
 def starts(data: Transitions) -> np.ndarray:

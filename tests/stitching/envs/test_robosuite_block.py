@@ -8,7 +8,16 @@ import mujoco
 import numpy as np
 import pytest
 
-from stitching.envs.robosuite.block import CONTROL_STEPS, OBJECTS, SUBSTEPS, RobosuiteBlock, poses
+from stitching.envs.robosuite.block import (
+    CONTROL_STEPS,
+    FINGER_POSITIONS,
+    GRIP_POSITION,
+    HAND_QUATERNION,
+    OBJECTS,
+    SUBSTEPS,
+    RobosuiteBlock,
+    poses,
+)
 from stitching.envs.robosuite.can import BIN, CAN, HALF_SIZE, PLACE, Can, can_pose, placed
 from stitching.envs.robosuite.door import CLOSED, DOOR, OPEN, WIDEST, Door
 from stitching.streams import stream
@@ -197,6 +206,27 @@ def test_an_action_ends_on_arrival_or_after_its_steps(benchmark: Door | Can) -> 
     np.testing.assert_allclose(steps[-1], 1)
     gap = block.observe(ROWS)[:, :3] - benchmark.workspace.mean(axis=0)
     assert np.linalg.norm(gap, axis=1).max() < 0.01
+
+
+@both
+def test_the_pose_is_what_actions_bring_back_and_the_hand_s_tilt_is_not(
+    benchmark: Door | Can,
+) -> None:
+    block = benchmark.block()
+    block.reset(streams())
+    begun = block.observe(ROWS)
+    action = np.zeros((EPISODES, 5), dtype=np.float32)
+    low, high = benchmark.workspace
+    home = 2 * (begun[:, GRIP_POSITION] - low) / (high - low) - 1
+    for there in (action[:, :3], home):
+        action[:, :3] = there
+        for _ in range(4):
+            block.step(ROWS, action)
+    gaps = np.abs(block.observe(ROWS) - begun).max(axis=0)
+    assert gaps[GRIP_POSITION].max() < 0.01  # m
+    assert gaps[HAND_QUATERNION].max() > 0.04
+    pose = np.array(benchmark.factors.pose)
+    np.testing.assert_array_equal(pose, np.r_[GRIP_POSITION, FINGER_POSITIONS])
 
 
 @both
