@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from importlib import resources
 from itertools import permutations
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import tyro
 
@@ -30,13 +30,12 @@ from orchestrator.methods import (
     parse_method,
 )
 from orchestrator.structure import Plain, merged, nested, structure, to_plain
-from orchestrator.tomls import based_fields, read_toml, toml_names
+from orchestrator.tomls import Scale, based_fields, read_toml, toml_names
 from stitching.envs.registry import BENCHMARKS
 from stitching.models.dynamics import DynamicsConfig
 from stitching.models.iql import IQLConfig
 from stitching.rollout import RolloutConfig
 
-Scale = Literal["smoke", "quick", "standard", "paper"]
 NAME = re.compile(r"[A-Za-z0-9][\w.-]*")  # becomes part of paths
 
 

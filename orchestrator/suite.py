@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from analysis.run import plain_label
 from orchestrator.errors import UsageError
 from orchestrator.rundir import RunDirectory
 from orchestrator.spec import (
     PACKAGED,
-    Scale,
     Spec,
     TableSpec,
     check_names,
@@ -22,7 +21,7 @@ from orchestrator.spec import (
     spec_from_plain,
 )
 from orchestrator.structure import Plain, merged, structure, to_plain
-from orchestrator.tomls import based_fields, read_toml
+from orchestrator.tomls import Scale, based_fields, check_scales, read_toml
 
 OWN_FIELDS = ("name", "title", "parts", "tables", "skill_labels")  # all others are the parts'
 NOT_OF_A_PART = ("name", "title", "scale", "tables")
@@ -151,10 +150,7 @@ def _part_spec(entry: PartFields, content: Plain, scale: Scale, folder: Path, wh
     Of the part's settings those of the scale come last.
     """
     where = f"{where}, part {entry.label}"
-    if unknown := [name for name in entry.scales if name not in get_args(Scale)]:
-        raise UsageError(
-            f"{where}: no scale {unknown[0]!r}; there are {', '.join(get_args(Scale))}"
-        )
+    check_scales(entry.scales, where)
     settings = merged(entry.settings, entry.scales.get(scale, {}))
     if foreign := [name for name in NOT_OF_A_PART if name in settings]:
         raise UsageError(f"{where}, settings: {foreign[0]!r} is the suite's; set it there")

@@ -5,13 +5,12 @@ from __future__ import annotations
 import tomllib
 from importlib.resources.abc import Traversable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any, Literal, get_args
 
 from orchestrator.errors import UsageError
 from orchestrator.structure import Plain, merged
 
-if TYPE_CHECKING:
-    from orchestrator.spec import Scale
+Scale = Literal["smoke", "quick", "standard", "paper"]
 
 
 def toml_names(packaged: Traversable) -> list[str]:
@@ -56,10 +55,19 @@ def at_scale(content: Plain, scale: Scale, where: str) -> Plain:
     scales = content.get("scales", {})
     if not isinstance(scales, dict) or not all(isinstance(s, dict) for s in scales.values()):
         raise UsageError(f"{where}, scales: expected a table of fields for each scale")
+    check_scales(scales, where)
     scales = {"paper": {}} | scales
     if scale not in scales:
         raise UsageError(f"{where}: no scale {scale!r}; it has {', '.join(scales)}")
     return merged(fields, scales[scale]) | {"scale": scale}
+
+
+def check_scales(scales: dict[str, Any], where: str) -> None:
+    """Raises UsageError for a name that is no scale."""
+    if unknown := [name for name in scales if name not in get_args(Scale)]:
+        raise UsageError(
+            f"{where}: no scale {unknown[0]!r}; there are {', '.join(get_args(Scale))}"
+        )
 
 
 def based_fields(

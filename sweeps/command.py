@@ -14,7 +14,7 @@ from orchestrator.executors import ExecutorKind
 from orchestrator.progress import ConsoleProgress
 from orchestrator.reproduce import Settings
 from orchestrator.rundir import RunDirectory
-from orchestrator.spec import Scale
+from orchestrator.tomls import Scale
 from sweeps.costs import plan_lines
 from sweeps.spec import load_sweep, packaged_sweeps
 from sweeps.sweep import carry_out, default_out

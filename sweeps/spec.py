@@ -9,14 +9,13 @@ from typing import Any, Literal
 
 from orchestrator.errors import UsageError
 from orchestrator.spec import (
-    Scale,
     Spec,
     TableSpec,
     load_spec,
     spec_from_plain,
 )
 from orchestrator.structure import Plain, merged, structure, to_plain
-from orchestrator.tomls import load_toml, toml_names
+from orchestrator.tomls import Scale, load_toml, toml_names
 from stitching.streams import stream
 from sweeps.questions import METRICS, question_of
 from sweeps.questions.question import Question

@@ -7,8 +7,9 @@ from typing import get_args
 
 from orchestrator.errors import UsageError
 from orchestrator.rundir import RunDirectory
-from orchestrator.spec import Scale, Spec
+from orchestrator.spec import Spec
 from orchestrator.structure import Plain
+from orchestrator.tomls import Scale
 from sweeps.space import replaced
 
 RUNS = Path("runs")

@@ -9,7 +9,8 @@ from orchestrator.errors import UsageError
 from orchestrator.kits import KITS
 from orchestrator.plan import Plan, make_plan
 from orchestrator.rundir import describe
-from orchestrator.spec import Scale, Spec, load_spec
+from orchestrator.spec import Spec, load_spec
+from orchestrator.tomls import Scale
 
 METHOD = "single-policy"
 

@@ -9,9 +9,10 @@ import pytest
 
 from orchestrator.errors import UsageError
 from orchestrator.methods import MBStitchConfig, method_label
-from orchestrator.spec import Scale, differences, load_spec, packaged_specs, spec_from_plain
+from orchestrator.spec import differences, load_spec, packaged_specs, spec_from_plain
 from orchestrator.structure import to_plain
 from orchestrator.suite import Suite, load_asked
+from orchestrator.tomls import Scale
 
 
 @pytest.mark.parametrize("name", packaged_specs())
@@ -115,6 +116,7 @@ def test_the_spec_below_is_sound(tmp_path: Path) -> None:
         (SOUND.replace("2=50", "2=0"), "step_limits, 2: must be at least 1"),
         (SOUND + "scales = ['paper']", "scales: expected a table"),
         (SOUND + "scales.paper = 3", "scales: expected a table"),
+        (SOUND + "[scales.quik]", "no scale 'quik'; there are smoke, quick, standard, paper"),
         (SOUND.replace("'maze'", "['maze']"), r"unknown benchmark \['maze'\]; there are maze"),
         (SOUND.replace("''", "1979-05-27"), "title: expected str"),
         (SOUND + "# \udcff", "not valid TOML"),

@@ -10,7 +10,8 @@ from analysis.rows import place_tasks
 from analysis.run import RunSpec
 from orchestrator.errors import UsageError
 from orchestrator.rundir import describe
-from orchestrator.spec import Scale, TableSpec, load_spec
+from orchestrator.spec import TableSpec, load_spec
+from orchestrator.tomls import Scale
 from sweeps.space import Dimension, replaced
 from sweeps.spec import (
     Confirm,
