@@ -16,11 +16,11 @@ from rich.console import Console
 
 from orchestrator.errors import IncompleteError, SkillstitchError, UsageError
 from orchestrator.executors import ExecutorKind
+from orchestrator.interruption import interrupted_by_sigterm
 from orchestrator.spec import Spec, packaged_specs
 from orchestrator.suite import Suite, is_suite, load_asked, part_directories, with_specs
 
-INTERRUPTED = 130
-UNREAD = 141  # as shells count a process that SIGPIPE ended
+INTERRUPTED, UNREAD, TERMINATED = 130, 141, 143  # as shells count SIGINT, SIGPIPE and SIGTERM
 ERRORS = Console(stderr=True, highlight=False, soft_wrap=True)
 OUTPUT = Console(highlight=False, soft_wrap=True)
 
@@ -56,13 +56,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Entry point; exits with 0, or the code of the error (see `orchestrator.errors`)."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        _dispatch(words)
+        with interrupted_by_sigterm() as sigterm:
+            _dispatch(words)
     except SkillstitchError as error:
         ERRORS.print(f"error: {error}", markup=False)
         sys.exit(error.exit_code)
     except KeyboardInterrupt:
         ERRORS.print("interrupted; the same command resumes", markup=False)
-        sys.exit(INTERRUPTED)
+        sys.exit(TERMINATED if sigterm.received else INTERRUPTED)
     except BrokenPipeError:  # nobody reads on, as after `| head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(UNREAD)

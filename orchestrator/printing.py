@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from orchestrator.cores import usable_cores
 from orchestrator.costs import Estimate, estimate
 from orchestrator.ledger import Ledger
 from orchestrator.methods import method_label
@@ -73,7 +73,7 @@ def forecast_lines(plan: Plan, store: Store) -> Iterator[str]:
 
 
 def _time_line(costs: list[Estimate], workers: int | None) -> str:
-    workers = workers or os.cpu_count() or 1
+    workers = workers or usable_cores()
     measured = all(each.from_history for each in costs)
     source = "measured in this store" if measured else "from a reference machine"
     training = sum(each.seconds_training for each in costs)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.metadata
-import os
 import platform
 import subprocess
 from collections.abc import Iterable
@@ -11,6 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from orchestrator.builders import BLOCK_CODE, BLOCK_SETUP, BUILDERS
+from orchestrator.cores import usable_cores
 from orchestrator.recipes import NUMERIC_PACKAGES, code_fingerprint
 from orchestrator.structure import Plain
 
@@ -46,7 +46,7 @@ def provenance() -> Plain:
         | {name: _version(name) for name in REPORTED_PACKAGES},
         "git_revision": git_revision(),
         "cpu": _cpu(),
-        "cores": os.cpu_count(),
+        "cores": usable_cores(),
         "system": f"{platform.system()} {platform.machine()}",
     }
 

@@ -8,6 +8,7 @@ import sqlite3
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+from orchestrator.cores import usable_cores
 from orchestrator.doctor import machine, packages, selftest, storage
 from orchestrator.doctor.finding import Finding
 
@@ -20,9 +21,7 @@ def diagnose(root: Path) -> list[Finding]:
     checks: dict[str, Callable[[], Iterable[Finding]]] = {
         "Python": lambda: [packages.judge_python(platform.python_version())],
         "packages": packages.check_packages,
-        "cores": lambda: [
-            machine.judge_cores(machine.usable_cores(), os.environ.get("OMP_NUM_THREADS"))
-        ],
+        "cores": lambda: [machine.judge_cores(usable_cores(), os.environ.get("OMP_NUM_THREADS"))],
         "memory": lambda: [machine.judge_memory(machine.total_memory())],
         "shared memory": lambda: [machine.check_shared_memory()],
         "GPU": lambda: [machine.check_gpu()],

@@ -5,18 +5,12 @@ from __future__ import annotations
 import ctypes.util
 import os
 import shutil
-import sys
 from pathlib import Path
 
 from orchestrator.doctor.finding import GIB, Finding, gib
 
 LEAST_MEMORY, ENOUGH_MEMORY = 2 * GIB, 8 * GIB
 ENOUGH_SHARED_MEMORY = 1 * GIB
-
-
-def usable_cores() -> int:
-    """Cores this process may run on, which a container or a batch system may restrict."""
-    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 
 
 def judge_cores(cores: int, omp_threads: str | None) -> Finding:

@@ -9,7 +9,9 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Any
 
+from orchestrator.cores import usable_cores
 from orchestrator.errors import UsageError
+from orchestrator.interruption import own_handler_kept
 from orchestrator.jobs import BuildJob, Job, PlayJob, Report
 from orchestrator.store import Artifact
 
@@ -187,18 +189,20 @@ def _start(workers: int | None, address: str | None) -> None:
     if address is not None:
         try:
             _knock(address)
-            ray.init(address=address, runtime_env={"env_vars": environment}, **common)
+            with own_handler_kept():
+                ray.init(address=address, runtime_env={"env_vars": environment}, **common)
         except (OSError, ValueError, RuntimeError) as error:
             raise UsageError(f"no Ray cluster at {address}: {_first_line(error)}") from error
         return
     os.environ.update(environment)
-    ray.init(
-        address="local",
-        num_cpus=workers or os.cpu_count(),
-        include_dashboard=False,
-        object_store_memory=OBJECT_STORE_BYTES,
-        **common,
-    )
+    with own_handler_kept():
+        ray.init(
+            address="local",
+            num_cpus=workers or usable_cores(),
+            include_dashboard=False,
+            object_store_memory=OBJECT_STORE_BYTES,
+            **common,
+        )
 
 
 def _knock(address: str) -> None:

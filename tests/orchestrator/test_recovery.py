@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from orchestrator.cli import TERMINATED
 from orchestrator.spec import Spec
 from tests.orchestrator.executors.processes import descendants, title, titled
 from tests.orchestrator.tiny import (
@@ -127,7 +128,13 @@ def launch(place: Place) -> subprocess.Popen[bytes]:
     options = ["--workers", "2", "--tracking-uri", "none"]
     paths = ["--out", str(place.out), "--store", str(place.store_root)]
     command = [sys.executable, "-m", "orchestrator.cli", "run", str(TINY), *options, *paths]
-    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    place.root.mkdir(parents=True, exist_ok=True)
+    with errors_of(place).open("wb") as errors:
+        return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=errors)
+
+
+def errors_of(place: Place) -> Path:
+    return place.root / "errors"
 
 
 def artifacts_built(place: Place) -> int:
@@ -174,6 +181,42 @@ def test_a_process_of_a_ray_run_is_killed(
         assert code == 0  # the driver sees to it that the work is done again
     else:
         place.carry_out(spec)
+    assert promised_bytes(place.out) == expected
+    assert place.directory.finished
+    assert place.directory.read_json("quarantine.json") == []
+
+
+# SIGTERM of the driver: when Ray has begun to start, while it trains, and while it plays.
+MOMENTS: dict[str, Callable[[Place, int], bool]] = {
+    "starting": lambda place, driver: bool(titled(driver, "gcs_server")),
+    "training": lambda place, driver: artifacts_built(place) >= 2,
+    "playing": lambda place, driver: blocks_played(place.out) >= 3,
+}
+
+
+@pytest.mark.ray
+@pytest.mark.slow
+@pytest.mark.timeout(240)
+@pytest.mark.parametrize("moment", MOMENTS)
+def test_sigterm_ends_a_ray_run_as_ctrl_c_does(
+    spec: Spec, place: Place, expected: dict[str, bytes], cleared: list[int], moment: str
+) -> None:
+    run = launch(place)
+    while run.poll() is None and not MOMENTS[moment](place, run.pid):
+        time.sleep(0.01)
+    processes = descendants(run.pid)
+    cleared += processes
+    run.terminate()
+    assert run.wait(60) == TERMINATED
+    *progress, last = errors_of(place).read_text().splitlines()
+    assert last == "interrupted; the same command resumes"
+    assert all(line.startswith(("training: ", "evaluation: ")) for line in progress), progress
+    deadline = time.monotonic() + 30
+    while any("ray" in title(process) for process in processes):
+        assert time.monotonic() < deadline, [title(process) for process in processes]
+        time.sleep(0.1)
+
+    place.carry_out(spec)
     assert promised_bytes(place.out) == expected
     assert place.directory.finished
     assert place.directory.read_json("quarantine.json") == []
