@@ -5,8 +5,10 @@ from __future__ import annotations
 import shutil
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 
+from orchestrator import locking
 from orchestrator.errors import UsageError
 from orchestrator.ledger import Ledger
 from orchestrator.plan import make_plan
@@ -21,14 +23,21 @@ SECONDS_TO_WRITE = 3600
 def collect_garbage(store_root: Path, runs: Sequence[Path], *, delete: bool) -> Iterator[str]:
     """Say, and with `delete` remove, artifacts and blocks that no plan of `runs` names.
 
-    Raises UsageError for a path that is no run directory: a typing error must not cost artifacts.
+    Raises UsageError for a path that is no run directory, or no store: a typing error must not cost
+    artifacts. Raises LockedError, with `delete`, while a run or sweep uses the store.
     """
     if not runs:
         raise UsageError("name the run directories to keep, for example runs/table1-paper")
     needed: set[str] = set()
     for run in map(RunDirectory, runs):
         needed |= _of_suite(run) if is_suite(run) else _of_run(run)
-    store = Store(store_root)
+    if not (store_root / "blocks.sqlite").is_file():
+        raise UsageError(f"{store_root} is no store: it has no blocks.sqlite")
+    with locking.alone(store_root) if delete else nullcontext():
+        yield from _collect(Store(store_root), needed, delete=delete)
+
+
+def _collect(store: Store, needed: set[str], *, delete: bool) -> Iterator[str]:
     verb = "deleted" if delete else "would delete"
     freed = 0
     for kind, key in list(store.artifacts()):
@@ -38,7 +47,7 @@ def collect_garbage(store_root: Path, runs: Sequence[Path], *, delete: bool) -> 
             if delete:
                 shutil.rmtree(folder)
             yield f"{verb} {folder}"
-    for leftovers in (store_root / "incoming", store_root / "corrupt"):
+    for leftovers in (store.root / "incoming", store.root / "corrupt"):
         for folder in sorted(leftovers.glob("*")):
             if time.time() - folder.stat().st_mtime < SECONDS_TO_WRITE:
                 continue  # somebody may be writing it
@@ -46,7 +55,7 @@ def collect_garbage(store_root: Path, runs: Sequence[Path], *, delete: bool) -> 
             if delete:
                 shutil.rmtree(folder)
             yield f"{verb} {folder}"
-    shared = Ledger(store_root / "blocks.sqlite")
+    shared = Ledger(store.root / "blocks.sqlite")
     stale = shared.finished() - needed
     if delete:
         shared.forget(stale)

@@ -90,7 +90,8 @@ class Ledger:
         with self._storage_errors():
             if read_only:
                 # Not mode=ro: what a killed writer left half-done may have to be rolled back first.
-                self._db = sqlite3.connect(f"file:{path}?mode=rw", uri=True, timeout=30)
+                there = f"{path.resolve().as_uri()}?mode=rw"
+                self._db = sqlite3.connect(there, uri=True, timeout=30)
                 if not self._has_tables():  # it was killed before it had made them
                     self._db.close()
                     self._db = sqlite3.connect(":memory:")

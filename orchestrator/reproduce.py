@@ -10,7 +10,7 @@ from pathlib import Path
 
 from analysis.episodes import write_episodes
 from analysis.report import build_report
-from orchestrator import tracking
+from orchestrator import locking, tracking
 from orchestrator.building import Builds, verified_artifacts
 from orchestrator.errors import (
     BadDataError,
@@ -94,7 +94,7 @@ def reproduce(spec: Spec, settings: Settings, progress: Progress) -> RunDirector
     to be given up (everything else is then finished and reported as partial).
     """
     directory, watch = RunDirectory(settings.out), Stopwatch()
-    with directory.locked():
+    with directory.locked(), locking.shared(settings.store):
         run_id = directory.settle(spec)
         with tracked(directory, settings, progress, watch):
             worked = _carry_out(spec, settings, directory, run_id, progress, watch)

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
 import json
-import os
-import socket
 import uuid
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -14,14 +11,15 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import analysis
-from orchestrator.errors import ChangedError, LockedError, UsageError
+from orchestrator import locking
+from orchestrator.errors import ChangedError, UsageError
 from orchestrator.kits import KITS
 from orchestrator.ledger import Ledger
 from orchestrator.methods import first_method, method_label
 from orchestrator.plan import make_plan
 from orchestrator.provenance import matters
 from orchestrator.spec import Spec, TableSpec, differences, spec_from_plain
-from orchestrator.store import storage_errors, write_atomically
+from orchestrator.store import write_atomically
 from orchestrator.structure import Plain, to_plain
 
 REPORT_SOURCES = (".py", ".csv", ".html", ".css", ".js")
@@ -69,29 +67,9 @@ class RunDirectory:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Hold the directory; LockedError at once, naming the holder, if somebody else does.
-
-        The kernel drops the lock with its process, however that ends.
-        """
-        with storage_errors(self.path):
-            self.path.mkdir(parents=True, exist_ok=True)
-            descriptor = os.open(self.path / "lock", os.O_RDWR | os.O_CREAT, 0o644)
-        try:
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                holder = os.read(descriptor, 200).decode(errors="replace").strip()
-                raise LockedError(
-                    f"{self.path} is in use by {holder or 'another process'}; "
-                    "wait for it, or choose another --out"
-                ) from None
-            with storage_errors(self.path):
-                os.ftruncate(descriptor, 0)
-                holder = f"process {os.getpid()} on {socket.gethostname()}"
-                os.pwrite(descriptor, holder.encode(), 0)
+        """Hold the directory; LockedError at once, naming the holder, if somebody else does."""
+        with locking.held(self.path):
             yield
-        finally:
-            os.close(descriptor)
 
     def settle(self, spec: Spec) -> str:
         """Claim the directory for a spec, or check that it is the same one; returns the run's id.

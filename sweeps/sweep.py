@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from orchestrator import locking
 from orchestrator.errors import ChangedError, UsageError
 from orchestrator.progress import Progress
 from orchestrator.provenance import provenance
@@ -46,7 +47,7 @@ def carry_out(
     Raises what a reproduction raises; IncompleteError loses nothing.
     """
     directory = RunDirectory(settings.out)
-    with directory.locked():
+    with directory.locked(), locking.shared(settings.store):
         run_id = directory.settle(search_spec(sweep))
         settle(directory, sweep)
         study = SweepStudy(sweep, directory.path)

@@ -54,13 +54,19 @@ def is_gone(uri: str) -> bool:
 def turn_to_write(uri: str) -> Iterator[None]:
     """One publisher at a time for a SQLite store; servers see to that themselves.
 
-    Raises TrackingError if the store stays locked. Asked up front, because MLflow itself would
-    wait 20 seconds in every single call.
+    Raises TrackingError if the store stays locked, which is asked up front, because MLflow itself
+    would wait 20 seconds in every single call; and for a path with "?" or "%": MLflow and its
+    database library read such a URI differently.
     """
     database = _database(uri)
     if database is None:
         yield
         return
+    if "?" in uri or "%" in uri:
+        raise TrackingError(
+            f"MLflow cannot keep a SQLite store at a path with “?” or “%”, as {database} has: "
+            "name another with --tracking-uri sqlite:///FILE"
+        )
     database.parent.mkdir(parents=True, exist_ok=True)
     with database.with_name(f"{database.name}.lock").open("w") as file:
         deadline = time.monotonic() + TURN_SECONDS

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NoReturn
 from unittest import mock
 
 import numpy as np
@@ -16,6 +17,7 @@ import pytest
 
 from orchestrator import worker
 from orchestrator.cli import COMMANDS, main
+from orchestrator.errors import LockedError
 from orchestrator.plan import Plan
 from orchestrator.spec import Spec
 from orchestrator.store import Artifact
@@ -389,6 +391,50 @@ def test_gc(cli: Cli, done: Place, plan: Plan, expected: dict[str, bytes], spec:
         assert cli("run", *options(done)).code == 0
     assert promised_bytes(done.out) == expected
     carry_out(changed, serially(other, done.store_root))  # what was deleted is made again
+
+
+def test_paths_with_characters_that_mean_something_in_a_uri(
+    cli: Cli, finished: Place, tmp_path: Path
+) -> None:
+    place = Place(tmp_path / "seed#1 50%? done%20")
+    shutil.copytree(finished.root, place.root)
+    played = len(finished.finished_blocks())
+    assert f"blocks     {played} played" in cli("status", place.out).out
+    for words in (["plan", TINY, "--store"], ["gc", place.out, "--store"]):
+        there = cli(*words, place.store_root).out
+        assert there == cli(*words, finished.store_root).out.replace(
+            str(finished.root), str(place.root)
+        )
+    assert set(tmp_path.iterdir()) == {place.root}
+
+
+def test_gc_deletes_nothing_while_a_run_uses_the_store(cli: Cli, done: Place, spec: Spec) -> None:
+    """Not even what no run needs: one at work has not yet said what it needs."""
+    other = done.root / "other"
+    changed = replace(spec, mb_stitch=replace(spec.mb_stitch, alpha=4.5))
+    found: list[int] = []
+
+    def play(*_: object) -> NoReturn:
+        found.append(cli("gc", done.out, "--store", done.store_root, "--delete").code)
+        raise KeyboardInterrupt
+
+    before = set(done.store.artifacts())
+    with (
+        mock.patch("orchestrator.worker.BlockPlayer.play", side_effect=play),
+        pytest.raises(KeyboardInterrupt),
+    ):
+        carry_out(changed, serially(other, done.store_root))
+    assert found == [LockedError.exit_code]
+    assert set(done.store.artifacts()) == before
+    assert cli("gc", done.out, "--store", done.store_root, "--delete").code == 0
+
+
+def test_gc_makes_nothing_of_a_folder_that_is_no_store(cli: Cli, done: Place) -> None:
+    folder = done.root / "elsewhere"
+    answer = cli("gc", done.out, "--store", folder, "--delete")
+    assert answer.code == 2
+    assert f"{folder} is no store" in answer.err
+    assert not folder.exists()
 
 
 def test_gc_keeps_everything_where_a_name_is_wrong(cli: Cli, done: Place) -> None:

@@ -62,6 +62,20 @@ def test_a_locked_database_is_said_and_made_up_for_later(
     assert not pending(run_dir, uri)
 
 
+@pytest.mark.parametrize(("name", "ok"), [("seed#1 a", True), ("50%23", False), ("why?", False)])
+def test_a_folder_whose_name_means_something_in_a_uri(
+    run_dir: Path, tmp_path: Path, name: str, ok: bool
+) -> None:
+    """It is used, or refused in one line; no other folder appears."""
+    folder = tmp_path / "kept" / name
+    folder.mkdir(parents=True)
+    outcome = publish(run_dir, default_uri(folder), finished=True)
+    assert outcome.ok == ok
+    assert (folder / "mlflow.db").exists() == ok
+    assert ok or "--tracking-uri sqlite:///FILE" in outcome.error
+    assert list(folder.parent.iterdir()) == [folder]
+
+
 @pytest.mark.parametrize("uri", ["nonsense://x", "sqlite:////proc/nowhere/mlflow.db"])
 def test_a_store_that_cannot_be_is_no_reason_to_stop(run_dir: Path, uri: str) -> None:
     outcome = publish(run_dir, uri, finished=True)
