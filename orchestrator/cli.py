@@ -223,12 +223,12 @@ def _status(words: list[str]) -> None:
     from orchestrator.reproduce import catch_up
     from orchestrator.rundir import RunDirectory
 
-    def status(run: tyro.conf.Positional[Path], store: Path = Path("runs/store")) -> None:
+    def status(run: tyro.conf.Positional[Path], store: Path | None = None) -> None:
         """How far a run directory is.
 
         Args:
             run: the run directory.
-            store: where its artifacts are kept.
+            store: where its artifacts are kept; default: where it was last carried out.
         """
         directory = RunDirectory(run)
         lines = suite_status_lines if is_suite(directory) else status_lines

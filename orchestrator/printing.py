@@ -113,11 +113,11 @@ def suite_plan_lines(suite: Suite, store_root: Path, workers: int | None) -> Ite
     yield _disk_line(costs)
 
 
-def status_lines(directory: RunDirectory, store_root: Path) -> Iterator[str]:
-    """How far a run is: artifacts, blocks by method, what was given up."""
+def status_lines(directory: RunDirectory, store_root: Path | None = None) -> Iterator[str]:
+    """How far a run is: artifacts in a store (default: its own), blocks, what was given up."""
     spec = directory.spec()
     plan = make_plan(spec)
-    store = Store(store_root)
+    store = Store(store_root or directory.store_root)
     built = sum((recipe.kind, key) in store for key, recipe in plan.recipes.items())
     ledger = directory.ledger(read_only=True)
     finished, failures = ledger.finished(), ledger.failures()
@@ -137,7 +137,7 @@ def _report_line(directory: RunDirectory) -> str:
     return f"  report     {report if report.is_file() else 'not written yet'}"
 
 
-def suite_status_lines(directory: RunDirectory, store_root: Path) -> Iterator[str]:
+def suite_status_lines(directory: RunDirectory, store_root: Path | None) -> Iterator[str]:
     """How far a suite and each of its parts is."""
     asked = directory.asked()
     yield f"{directory.path}: {asked['name']} at {asked['scale']} scale"

@@ -28,7 +28,7 @@ from orchestrator.ledger import Ledger
 from orchestrator.plan import Plan, make_plan
 from orchestrator.progress import Progress
 from orchestrator.provenance import provenance
-from orchestrator.rundir import RunDirectory
+from orchestrator.rundir import USUAL_STORE, RunDirectory
 from orchestrator.spec import Spec
 from orchestrator.stopwatch import Stopwatch
 from orchestrator.store import Artifact, Store, storage_errors
@@ -42,7 +42,7 @@ class Settings:
     """Where and how a run is carried out; nothing here may change its results."""
 
     out: Path
-    store: Path = Path("runs/store")
+    store: Path = USUAL_STORE
     executor: ExecutorKind = "ray"
     workers: int | None = None  # all cores, or all of the cluster's
     address: str | None = None  # of a Ray cluster
@@ -96,6 +96,7 @@ def reproduce(spec: Spec, settings: Settings, progress: Progress) -> RunDirector
     directory, watch = RunDirectory(settings.out), Stopwatch()
     with directory.locked(), locking.shared(settings.store):
         run_id = directory.settle(spec)
+        directory.uses(settings.store)
         with tracked(directory, settings, progress, watch):
             worked = _carry_out(spec, settings, directory, run_id, progress, watch)
         if worked:

@@ -22,6 +22,7 @@ from orchestrator.spec import Spec, TableSpec, differences, spec_from_plain
 from orchestrator.store import write_atomically
 from orchestrator.structure import Plain, to_plain
 
+USUAL_STORE = Path("runs/store")
 REPORT_SOURCES = (".py", ".csv", ".html", ".css", ".js")
 
 
@@ -30,6 +31,7 @@ class RunDirectory:
 
     spec.json         what was asked, resolved
     identity.json     id of this run, and the versions that must not change under it
+    store             path of the store that it was last carried out over
     ledger.sqlite     every finished block
     provenance.json   where, when and with what it was made
     segments.parquet, episodes.parquet, training.json, datasets.json, report/
@@ -47,6 +49,16 @@ class RunDirectory:
         if read_only and not path.is_file():
             raise UsageError(f"{self.path} has no ledger yet: nothing was played there")
         return Ledger(path, read_only=read_only)
+
+    @property
+    def store_root(self) -> Path:
+        """The store that it was last carried out over; the usual one where that is not known."""
+        path = self.path / "store"
+        return Path(path.read_text()) if path.is_file() else USUAL_STORE
+
+    def uses(self, store_root: Path) -> None:
+        """Remember the store."""
+        write_atomically(self.path / "store", str(store_root.resolve()).encode())
 
     @property
     def played(self) -> bool:

@@ -333,6 +333,14 @@ def test_status(cli: Cli, finished: Place, plan: Plan) -> None:
     assert str(finished.out / "report" / "index.html") in answer.out
 
 
+def test_status_looks_into_the_store_that_the_run_was_made_over(
+    cli: Cli, finished: Place, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = cli("status", finished.out, "--store", finished.store_root)
+    monkeypatch.chdir(tmp_path)
+    assert cli("status", finished.out) == asked
+
+
 def test_report(cli: Cli, done: Place, expected: dict[str, bytes]) -> None:
     shutil.rmtree(done.out / "report")
     answer = cli("report", done.out, "--results", done.root / "results")
