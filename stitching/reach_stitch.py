@@ -25,25 +25,43 @@ class Initiation:
 
     columns: list[int]  # of an observation, that make the robot's pose
     scale: Tensor  # (pose,) what they are divided by
-    poses: list[Tensor]  # by skill: (P, pose), in those units; none where nothing is known
+    states: list[Tensor]  # by skill: (P, observation); none where nothing is known
+    bystanders: list[list[int]]  # by skill: columns of the objects that it is not about
     radii: list[float]  # ε by skill
 
     @classmethod
     def of(cls, arrays: dict[str, np.ndarray]) -> Initiation:
-        """From what the artifact keeps: columns, scale, radii, and "poses.<skill>"."""
+        """From the artifact: columns, scale, radii, "states.<skill>", "bystanders.<skill>"."""
         radii = arrays["radii"].tolist()
-        poses = [torch.from_numpy(arrays[f"poses.{skill}"]) for skill in range(len(radii))]
-        return cls(arrays["columns"].tolist(), torch.from_numpy(arrays["scale"]), poses, radii)
+        return cls(
+            arrays["columns"].tolist(),
+            torch.from_numpy(arrays["scale"]),
+            [torch.from_numpy(arrays[f"states.{skill}"]) for skill in range(len(radii))],
+            [arrays[f"bystanders.{skill}"].tolist() for skill in range(len(radii))],
+            radii,
+        )
 
     def distances(self, states: Tensor, skill: int) -> Tensor:
         """To the nearest pose of the set: (..., observation) → (...); 0 where it is empty."""
-        poses = states[..., self.columns] / self.scale
-        if not len(self.poses[skill]):
-            return torch.zeros(poses.shape[:-1])
+        if not len(self.states[skill]):
+            return torch.zeros(states.shape[:-1])
+        return self._gaps(states.flatten(0, -2), skill).amin(dim=1).unflatten(0, states.shape[:-1])
+
+    def _gaps(self, states: Tensor, skill: int) -> Tensor:
+        """Between poses, to each of the set: (n, observation) → (n, P)."""
+        here, there = (each[:, self.columns] / self.scale for each in (states, self.states[skill]))
         # Without the matrix product, which is inexact near zero and taken by the number of rows.
-        exact = "donot_use_mm_for_euclid_dist"
-        flat = torch.cdist(poses.flatten(0, -2), self.poses[skill], compute_mode=exact)
-        return flat.amin(dim=1).unflatten(0, poses.shape[:-1])
+        return torch.cdist(here, there, compute_mode="donot_use_mm_for_euclid_dist")
+
+    def among_known_objects(self, states: Tensor, skill: int) -> Tensor:
+        """The same robots among other objects: (n, observation) → (n, observation).
+
+        Bystanders are as in that state of the set whose pose is nearest.
+        """
+        placed = states.clone()
+        nearest = self.states[skill][self._gaps(states, skill).argmin(dim=1)]
+        placed[:, self.bystanders[skill]] = nearest[:, self.bystanders[skill]]
+        return placed
 
     def outside(self, states: Tensor, skill: int) -> Tensor:
         """Which states are farther than ε from the set, (n, observation) → (n,) bool."""
@@ -55,7 +73,10 @@ class ReachStitch:
     """Plan towards the next skill's initiation set; nothing where the robot is in it already.
 
     A plan maximises E[−d(s')] − β·Var(T(s'|s, a)), s' being the state after the last action. Var(T)
-    is that of Eq. 2; E is the mean over the members of the dynamics, each at its own s'.
+    is that of Eq. 2; E is the mean over the members of the dynamics, each at its own s'. s is the
+    present state with the objects that the next skill is not about as they were where it was
+    demonstrated to begin: dynamics know nothing of cabinets that never stood open in the data, and
+    the robot moves alike beside them.
     """
 
     before_first: ClassVar[bool] = True
@@ -80,9 +101,8 @@ class ReachStitch:
         rows = outside.nonzero().flatten().tolist()
         actions = np.zeros((len(states), self.execute, self.actions.size), dtype=np.float32)
         if rows:
-            score = imagined(
-                states[rows], self.actions, partial(self._imagine, following=following)
-            )
+            known = self.initiation.among_known_objects(states[rows], following)
+            score = imagined(known, self.actions, partial(self._imagine, following=following))
             plan = self.planner.plan(score, [streams[row] for row in rows], self.actions)
             actions[rows] = plan.actions[:, : self.execute].numpy()
         return Proposal(actions, outside.numpy())

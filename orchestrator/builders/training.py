@@ -118,8 +118,10 @@ def _initiation_sets(params: Plain, inputs: Inputs) -> Artifact:
         "scale": pose_scale(data, factors),
         "radii": np.array([one.radius for one in sets]),
     }
-    poses = {f"poses.{skill}": one.poses for skill, one in enumerate(sets)}
-    return Artifact(arrays | poses, {"sizes": [len(one.poses) for one in sets]})
+    for number, (skill, one) in enumerate(zip(benchmark.skills, sets, strict=True)):
+        arrays[f"states.{number}"] = one.states
+        arrays[f"bystanders.{number}"] = np.array(factors.bystanders_of(skill.name), dtype=np.int64)
+    return Artifact(arrays, {"sizes": [len(one.states) for one in sets]})
 
 
 SETUP = ("orchestrator.builders.training",)

@@ -20,14 +20,14 @@ FINENESS = 0.25  # of ε: poses nearer than this to one that is kept are left ou
 
 @dataclass(frozen=True)
 class InitiationSet:
-    """Where one skill begins, as poses in units of `scale`, and how near is near enough.
+    """Where one skill begins, as states of its demonstrations, and how near is near enough.
 
     A skill without a demonstration that succeeds has an empty set, and ε is infinite: nothing is
     known of where it begins.
     """
 
-    poses: np.ndarray  # (P, pose) float32
-    radius: float  # ε: a pose this near to one of the set is in it
+    states: np.ndarray  # (P, observation) float32
+    radius: float  # ε: a state whose pose is this near to that of one of the set is in it
 
 
 def distance_scale(data: Transitions, columns: list[int]) -> np.ndarray:
@@ -67,12 +67,14 @@ def initiation_set(data: Transitions, factors: Factors, skill: int) -> Initiatio
         if success
     ]
     if not shown:
-        return InitiationSet(np.empty((0, len(columns)), dtype=np.float32), np.inf)
+        return InitiationSet(data.observations[:0], np.inf)
     every = np.concatenate(shown)
     moves = (data.next_observations[every] - data.observations[every])[:, columns] / scale
     radius = STEPS_NEAR * float(np.median(np.linalg.norm(moves, axis=1)))
-    starts = np.concatenate([_start(_path(data, rows)[:, columns] / scale) for rows in shown])
-    return InitiationSet(_thinned(starts, FINENESS * radius), radius)
+    paths = [_path(data, rows) for rows in shown]
+    starts = [path[: _begun(path[:, columns] / scale)] for path in paths]
+    states = np.concatenate(starts)
+    return InitiationSet(states[_thinned(states[:, columns] / scale, FINENESS * radius)], radius)
 
 
 def _path(data: Transitions, rows: np.ndarray) -> np.ndarray:
@@ -80,17 +82,16 @@ def _path(data: Transitions, rows: np.ndarray) -> np.ndarray:
     return np.concatenate([data.observations[rows], data.next_observations[rows[-1:]]])
 
 
-def _start(path: np.ndarray) -> np.ndarray:
-    """The first poses of a demonstration, until START of its way: (T + 1, pose) → (n, pose)."""
+def _begun(path: np.ndarray) -> int:
+    """How many poses a demonstration has until START of its way: of (T + 1, pose)."""
     away = np.linalg.norm(path - path[0], axis=1)
-    begun: np.ndarray = path[np.logical_and.accumulate(away <= START * away.max())]
-    return begun
+    return int(np.logical_and.accumulate(away <= START * away.max()).sum())
 
 
-def _thinned(poses: np.ndarray, gap: float) -> np.ndarray:
-    """Those farther than `gap` from all kept before them: (n, pose) → (P, pose)."""
-    kept = np.empty((0, poses.shape[1]), dtype=poses.dtype)
-    for pose in poses:
-        if not len(kept) or np.linalg.norm(kept - pose, axis=1).min() > gap:
-            kept = np.concatenate([kept, pose[None]])
+def _thinned(poses: np.ndarray, gap: float) -> list[int]:
+    """Which of (n, pose) are farther than `gap` from all kept before them."""
+    kept: list[int] = []
+    for number, pose in enumerate(poses):
+        if not kept or np.linalg.norm(poses[kept] - pose, axis=1).min() > gap:
+            kept.append(number)
     return kept

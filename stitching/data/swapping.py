@@ -14,29 +14,51 @@ import numpy as np
 
 from stitching.data.transitions import Transitions
 from stitching.envs.factors import NO_OBJECT, Factors
-from stitching.models.scale import observation_scale
 
-STILL = 0.1  # standard deviations of the dataset: a position that moves by less stands still
+STILL = 0.1  # of how far an object usually moves: one that moves by less stands still
 EACH = 0.5  # share of the objects that may be swapped which are
+LEFT = 0.5  # share of those that are as a demonstration about them left them
 
 
 def bystanders(data: Transitions, factors: Factors, skills: Sequence[str]) -> np.ndarray:
     """Which objects play no part in each episode, (E, objects) bool.
 
-    Those whose positions stand still throughout and are not what the demonstrated skill is about.
-    None in an episode that demonstrates no skill. skills: their names, as `episode_skills` numbers
-    them.
+    Those that stand still throughout and are not what the demonstrated skill is about. None in an
+    episode that demonstrates no skill. skills: their names, as `episode_skills` numbers them.
+
+    An object stands still where it moves by less than a tenth of what it usually moves: the median
+    over the demonstrations about it that succeed, or without any the most of all demonstrations.
+    (In units of its deviation over the data, one that is moved in few states would never do so:
+    what is seen of it blurs.) How far an object moves is how far that of its positions does that
+    moves most.
     """
-    _, scale = observation_scale(data.observations)  # a number that only blurs has scale 1
-    moved = _range(data) > STILL * scale  # (E, observation)
+    ranges = _range(data)  # (E, observation)
     positions = [list(factors.objects[name].positions) for name in factors.names]
-    still = np.stack([~moved[:, own].any(axis=1) for own in positions], axis=1)
+    moves = np.stack([ranges[:, own].max(axis=1) for own in positions], axis=1)  # (E, objects)
+    about = demonstrations_about(data, factors, skills)
+    usual = [
+        np.median(moves[about[:, number], number])
+        if about[:, number].any()
+        else moves[:, number].max()
+        for number in range(len(positions))
+    ]
+    still: np.ndarray = moves < STILL * np.array(usual)
     for episode, skill in enumerate(data.episode_skills.tolist()):
         if skill < 0:
             still[episode] = False
         elif (own := factors.own.get(skills[skill])) is not None:
             still[episode, factors.names.index(own)] = False
     return still
+
+
+def demonstrations_about(data: Transitions, factors: Factors, skills: Sequence[str]) -> np.ndarray:
+    """Which episodes show, with success, a skill that is about each object, (E, objects) bool."""
+    about = np.zeros((len(data.episode_skills), len(factors.names)), dtype=bool)
+    for skill, name in factors.own.items():
+        if skill in skills:
+            shown = (data.episode_skills == skills.index(skill)) & data.episode_successes
+            about[:, factors.names.index(name)] |= shown
+    return about
 
 
 def _range(data: Transitions) -> np.ndarray:
@@ -52,12 +74,16 @@ class Swapping:
     """Draws, for a minibatch of transitions, the objects to swap and the states to take them from.
 
     In a share of the transitions each bystander takes, with probability 0.5, the positions and
-    velocities that it has in a random state of the dataset, the same in s and s'.
+    velocities that it has in another state, the same in s and s'. In half of the cases that is the
+    one in which a demonstration about it that succeeded has left it, else any state of the dataset:
+    what is always done last is done in none of the others. An object that no demonstration is
+    about is always taken from any state.
     """
 
     share: float  # of the transitions, in [0, 1]
     object_of: np.ndarray  # (observation,) int64, the object of each column, NO_OBJECT for none
     bystanders: np.ndarray  # (N, objects) bool, by transition
+    left: tuple[np.ndarray, ...]  # by object: transitions (n,) int64 that end demonstrations of it
 
     @classmethod
     def of(
@@ -65,17 +91,30 @@ class Swapping:
     ) -> Swapping:
         lengths = np.diff(data.episode_ends, prepend=0)
         free = np.repeat(bystanders(data, factors, skills), lengths, axis=0)
-        return cls(share, factors.object_of(data.observations.shape[1]), free)
+        about = demonstrations_about(data, factors, skills)
+        left = tuple(data.episode_ends[own] - 1 for own in about.T)
+        return cls(share, factors.object_of(data.observations.shape[1]), free, left)
 
-    def draw(self, rows: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-        """For transitions (B,) int64: which numbers to swap, and the transitions to take them from.
+    def draw(
+        self, rows: np.ndarray, rng: np.random.Generator
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """For transitions (B,) int64: which numbers to swap, and where to take them from.
 
-        Returns (B, observation) bool and (B, observation) int64; numbers of one object come from
-        one state.
+        Returns (B, observation) each: bool, to be swapped; int64, transitions to take them from;
+        bool, whether from the state after that transition and not before. Numbers of one object
+        come from one state.
         """
         total, objects = self.bystanders.shape
         swapped = rng.random((len(rows), 1)) < self.share
         swapped = swapped & (rng.random((len(rows), objects)) < EACH) & self.bystanders[rows]
         donors = rng.integers(total, size=(len(rows), objects))
+        after = rng.random((len(rows), objects)) < LEFT
+        for number, last in enumerate(self.left):
+            if len(last):
+                done = last[rng.integers(len(last), size=len(rows))]
+                donors[:, number] = np.where(after[:, number], done, donors[:, number])
+            else:
+                after[:, number] = False
         belongs = self.object_of != NO_OBJECT
-        return swapped[:, self.object_of] & belongs, donors[:, self.object_of]
+        of = self.object_of
+        return swapped[:, of] & belongs, donors[:, of], after[:, of]

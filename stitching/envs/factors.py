@@ -37,6 +37,11 @@ class Factors:
         """The objects in the order in which others number them, which no file's order decides."""
         return tuple(sorted(self.objects))
 
+    def bystanders_of(self, skill: str) -> list[int]:
+        """Columns of all objects but the one that a skill is about."""
+        others = [name for name in self.names if name != self.own.get(skill)]
+        return [column for name in others for column in self.objects[name].columns]
+
     def object_of(self, size: int) -> np.ndarray:
         """The number of the object that each of `size` columns belongs to, (size,) int64.
 

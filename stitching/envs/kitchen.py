@@ -47,6 +47,7 @@ GOALS: dict[str, tuple[slice, tuple[float, ...]]] = {
     "kettle": (slice(23, 30), (-0.23, 0.75, 1.62, 0.99, 0.0, 0.0, -0.06)),
 }
 SKILLS = tuple(GOALS)
+IDLE = {"burner 1": slice(9, 11), "burner 3": slice(13, 15)}  # no skill is about them
 
 # fmt: off
 START = (
@@ -111,9 +112,10 @@ class Kitchen:
 
     @cached_property
     def factors(self) -> Factors:
-        """The joints' positions, and what each skill moves: its positions and velocities."""
+        """The joints' positions; all else is an object's, whether a skill is about it or not."""
         objects = {}
-        for name, (positions, _) in GOALS.items():
+        placed = {name: positions for name, (positions, _) in GOALS.items()} | IDLE
+        for name, positions in placed.items():
             # Velocities are numbered alike, but that the kettle has one fewer, and is the last.
             velocities = range(positions.start, min(positions.stop, VELOCITIES))
             moving = range(POSITIONS + velocities.start, POSITIONS + velocities.stop)

@@ -21,6 +21,8 @@ class Networks:
 
     mean: Tensor  # (observation,)
     std: Tensor
+    low: Tensor  # (observation,) what is seen is held to this range; infinite without `clip`
+    high: Tensor
     policy: Params
     log_std: Tensor  # (action,)
     v: Params
@@ -28,9 +30,12 @@ class Networks:
     @classmethod
     def of(cls, weights: Mapping[str, np.ndarray]) -> Networks:
         policy = parameters(weights, "policy")
+        unbounded = np.full_like(weights["observation_mean"], np.inf)
         return cls(
             mean=torch.from_numpy(weights["observation_mean"]),
             std=torch.from_numpy(weights["observation_std"]),
+            low=torch.from_numpy(weights.get("observation_low", -unbounded)),
+            high=torch.from_numpy(weights.get("observation_high", unbounded)),
             log_std=policy.pop("log_std").clamp(*LOG_STD_RANGE),
             policy=policy,
             v=parameters(weights, "v"),
@@ -65,7 +70,7 @@ class Agent:
 
     def _inputs(self, states: Tensor, condition: int) -> Tensor:
         own, conditions = self._networks[condition], self._conditions[condition]
-        scaled = (states - own.mean) / own.std
+        scaled = (states.clamp(own.low, own.high) - own.mean) / own.std
         return torch.cat([scaled, conditions.expand(len(states), -1)], dim=-1)
 
     def values(self, states: Tensor, condition: int) -> Tensor:

@@ -19,7 +19,7 @@ from stitching.data.experience import Experience
 from stitching.data.swapping import Swapping
 from stitching.envs.protocol import ActionSpace
 from stitching.models.layers import Params, Precision, at_precision, init_mlp, mlp, prefixed
-from stitching.models.scale import observation_scale
+from stitching.models.scale import observation_range, observation_scale
 from stitching.models.training import CurveLog, Curves, Trained, cosine
 from stitching.streams import stream
 
@@ -48,6 +48,7 @@ class IQLConfig:
     precision: Precision = "float32"  # of the hidden layers while training
     multi_task: bool = True  # one set of networks for all skills (Maze, Kitchen), or one a skill
     swap: float = 0.0  # share of the transitions in which objects that play no part are swapped
+    clip: bool = False  # what is seen is held to the range that the data have, number by number
     log_every: int = 500
 
     def __post_init__(self) -> None:
@@ -140,12 +141,16 @@ def train_iql(
 ) -> Trained:
     """Learn value ensemble and policy; all randomness comes from streams named by `labels`.
 
+    With `clip` the range of the data is kept beside the weights: all that is learned from lies in
+    it, so only what is asked later can be held to it.
+
     `policy_from`, of the same shape and with its "log_std", is where the policy starts; the values
     are learned anew. `swapping` alters the minibatches. Raises FloatingPointError when a loss stops
     being finite.
     """
-    mean, std = observation_scale(experience.data.observations)
-    state = experience.data.observations.shape[1] + experience.conditions.shape[1]
+    data = experience.data
+    mean, std = observation_scale(data.observations)
+    state = data.observations.shape[1] + experience.conditions.shape[1]
     hidden = [config.width] * config.hidden_layers
     init = stream("init", *labels)
     q = init_mlp(2 * config.members, [state + actions.size, *hidden, 1], init)
@@ -184,6 +189,9 @@ def train_iql(
         log.record(update, losses)
 
     weights = {"observation_mean": mean, "observation_std": std}
+    if config.clip:
+        low, high = observation_range(data.observations, data.next_observations)
+        weights |= {"observation_low": low, "observation_high": high}
     for prefix, params in (("q", q), ("v", v), ("policy", policy | {"log_std": log_std})):
         weights |= prefixed(params, prefix)
     return Trained(weights, log.curves)
@@ -235,8 +243,10 @@ def minibatches(
             row, condition = rows[index], conditions[condition_ids[index]]
             now, following = observations[row], next_observations[row]
             if swapping is not None:
-                swapped, donors = map(torch.from_numpy, swapping.draw(row.numpy(), rng))
-                other = observations[donors, columns]
+                swapped, donors, after = map(torch.from_numpy, swapping.draw(row.numpy(), rng))
+                other = torch.where(
+                    after, next_observations[donors, columns], observations[donors, columns]
+                )
                 now, following = (torch.where(swapped, other, own) for own in (now, following))
             yield Batch(
                 inputs=torch.cat([now, condition], dim=-1),

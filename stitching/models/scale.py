@@ -15,3 +15,10 @@ def observation_scale(observations: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     std = observations.std(axis=0, dtype=np.float64)
     std = np.where(std < SMALLEST_SCALE, 1.0, std)
     return observations.mean(axis=0, dtype=np.float64).astype(np.float32), std.astype(np.float32)
+
+
+def observation_range(*states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Least and greatest value of each dimension, of states (n, observation): (observation,)."""
+    low = np.minimum.reduce([part.min(axis=0) for part in states])
+    high = np.maximum.reduce([part.max(axis=0) for part in states])
+    return low.astype(np.float32), high.astype(np.float32)

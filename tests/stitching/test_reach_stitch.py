@@ -11,11 +11,12 @@ from stitching.streams import stream
 
 PLANE = ActionSpace(2, discrete=False)
 PLANNER = CEM(population=60, elites=10, horizon=2, iterations=40, momentum=0.5, tolerance=0.05)
-# The pose is (x, y), two numbers of three; the first skill begins at two places.
+# The pose is (x, y), the first and last of three numbers; the first skill begins at two places.
 SETS = Initiation(
     columns=[0, 2],
     scale=torch.tensor([2.0, 0.5]),
-    poses=[torch.tensor([[0.0, 0.0], [3.0, 0.0]]), torch.empty(0, 2)],
+    states=[torch.tensor([[0.0, 1.0, 0.0], [6.0, 2.0, 0.0]]), torch.empty(0, 3)],
+    bystanders=[[1], []],
     radii=[0.5, float("inf")],
 )
 
@@ -88,3 +89,15 @@ def test_a_price_on_disagreement_keeps_plans_where_members_agree() -> None:
     )
     assert abs(dear[0]) < abs(free[0]) / 2
     assert dear[1] < -0.3  # y is as sure as before
+
+
+def test_it_plans_among_the_objects_of_the_nearest_start() -> None:
+    """Dynamics are asked of objects as they know them, wherever these really are."""
+    states = torch.tensor([[2.0, 77.0, 0.5], [4.5, -77.0, -0.5]])
+    known = SETS.among_known_objects(states, 0)
+    assert known.tolist() == [[2.0, 1.0, 0.5], [4.5, 2.0, -0.5]]
+    assert states[:, 1].tolist() == [77.0, -77.0]
+    proposed, among_known = (
+        reach(SURE).propose(each, None, 0, streams(2)).actions for each in (states, known)
+    )
+    assert np.array_equal(proposed, among_known)

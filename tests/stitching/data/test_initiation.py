@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.distance import cdist
 
-from stitching.data.initiation import FINENESS, START, initiation_set, pose_scale
+from stitching.data.initiation import FINENESS, START, InitiationSet, initiation_set, pose_scale
 from stitching.data.transitions import Transitions
 from stitching.envs.factors import Factors
 from stitching.streams import stream
@@ -28,6 +28,12 @@ def walks(spread: float, pace: float, successes: int = EPISODES) -> Transitions:
         np.repeat([0, 1], EPISODES),
         done,
     )
+
+
+def poses(found: InitiationSet, data: Transitions) -> np.ndarray:
+    """In units of the scale."""
+    seen: np.ndarray = found.states[:, [0, 2]] / pose_scale(data, FACTORS)
+    return seen
 
 
 def paths(data: Transitions) -> np.ndarray:
@@ -61,13 +67,15 @@ def test_the_set_covers_every_start_and_holds_nothing_else() -> None:
     found = initiation_set(data, FACTORS, 0)
     begun = starts(data)
     assert EPISODES < len(begun) < EPISODES * STEPS
-    gaps = cdist(begun, found.poses)
+    kept = poses(found, data)
+    gaps = cdist(begun, kept)
     assert gaps.min(axis=1).max() <= FINENESS * found.radius + 1e-6
     assert gaps.min(axis=0).max() < 1e-6
-    between = cdist(found.poses, found.poses)
+    between = cdist(kept, kept)
     np.fill_diagonal(between, np.inf)
     assert between.min() > FINENESS * found.radius
-    assert len(found.poses) < len(begun)
+    assert len(kept) < len(begun)
+    assert set(map(tuple, found.states)) <= set(map(tuple, data.observations))
 
 
 def test_epsilon_is_two_steps_of_the_skills_demonstrations() -> None:
@@ -90,12 +98,13 @@ def test_a_start_is_a_share_of_the_way_however_many_steps_it_has() -> None:
         data.episode_successes,
     )
     once, twice = (initiation_set(one, FACTORS, 0) for one in (data, often))
-    assert cdist(once.poses, twice.poses).min(axis=1).max() <= once.radius / 2
-    assert cdist(twice.poses, once.poses).min(axis=1).max() <= once.radius
+    rarely, closely = poses(once, data), poses(twice, often)
+    assert cdist(rarely, closely).min(axis=1).max() <= once.radius / 2
+    assert cdist(closely, rarely).min(axis=1).max() <= once.radius
 
 
 @pytest.mark.parametrize(("skill", "successes"), [(1, EPISODES), (0, 0), (2, EPISODES)])
 def test_nothing_is_known_of_skills_that_never_succeed(skill: int, successes: int) -> None:
     found = initiation_set(walks(1.0, 0.1, successes), FACTORS, skill)
-    assert found.poses.shape == (0, 2)
+    assert found.states.shape == (0, 3)
     assert found.radius == np.inf

@@ -23,6 +23,7 @@ from stitching.envs.factors import Object
 from stitching.envs.kitchen import (
     GOAL_RADIUS,
     GOALS,
+    JOINTS,
     KITCHEN,
     PHYSICS_SIZE,
     SEEN,
@@ -494,3 +495,8 @@ def test_an_objects_columns_are_its_joints_positions_and_velocities(skill: str) 
             positions += [seen[position + i] for i in range(7 if free else 1)]
             velocities += [seen[model.nq + velocity + i] for i in range(6 if free else 1)]
     assert KITCHEN.factors.objects[skill] == Object(tuple(positions), tuple(velocities))
+
+
+def test_all_that_is_not_the_robot_s_is_an_object_s() -> None:
+    owned = [column for one in KITCHEN.factors.objects.values() for column in one.columns]
+    assert sorted(owned) == list(range(2 * JOINTS, KITCHEN.observation_size))

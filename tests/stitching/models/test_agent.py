@@ -147,6 +147,18 @@ def test_gaussian_samples_have_the_policys_spread() -> None:
 
 
 @SPACES
+def test_what_lies_outside_the_data_s_range_is_held_to_it(space: ActionSpace) -> None:
+    low, high = np.array([-1, -1, 0], np.float32), np.array([1, 2, 0], np.float32)
+    free = Agent(weights(), CONDITIONS, space)
+    bounds = {"observation_low": low, "observation_high": high}
+    held = Agent(weights() | bounds, CONDITIONS, space)
+    seen, within = torch.from_numpy(states()), torch.from_numpy(states().clip(low, high))
+    assert not torch.equal(seen, within)
+    assert torch.equal(held.values(seen, 1), free.values(within, 1))
+    assert np.array_equal(held.act(seen, 1, None), free.act(within, 1, None))
+
+
+@SPACES
 def test_conditions_matter(space: ActionSpace) -> None:
     agent, there = Agent(weights(), CONDITIONS, space), torch.from_numpy(states())
     assert not torch.equal(agent.values(there, 0), agent.values(there, 1))

@@ -561,7 +561,8 @@ def test_swapped_objects_are_the_same_in_both_states_and_others_as_they_were() -
     mean, std = observation_scale(experience.data.observations)
     owned = np.array([NO_OBJECT, 0, 1])
     free = np.tile([True, False], (len(experience.data), 1))
-    swapping = Swapping(share=1.0, object_of=owned, bystanders=free)
+    left = (np.array([], dtype=np.int64),) * 2
+    swapping = Swapping(share=1.0, object_of=owned, bystanders=free, left=left)
 
     def first_batch(swapping: Swapping | None) -> Batch:
         return next(minibatches(experience, mean, std, 200, stream("swaps"), swapping))
@@ -578,3 +579,30 @@ def test_swapped_objects_are_the_same_in_both_states_and_others_as_they_were() -
     seen = (experience.data.observations[:, 1] - mean[1]) / std[1]
     assert np.isin(swapped.inputs[:, 1].numpy(), seen).all()
     assert torch.equal(plain.rewards, swapped.rewards)
+
+
+def test_half_of_the_swapped_objects_are_as_a_demonstration_left_them() -> None:
+    experience = experience_of(SPACES["continuous"])
+    data = experience.data
+    mean, std = observation_scale(data.observations)
+    owned = np.array([NO_OBJECT, 0, NO_OBJECT])
+    free, last = np.ones((len(data), 1), dtype=bool), data.episode_ends[-1:] - 1
+    swapping = Swapping(share=1.0, object_of=owned, bystanders=free, left=(last,))
+    plain = next(minibatches(experience, mean, std, 400, stream("swaps"), None)).inputs[:, 1]
+    swapped = next(minibatches(experience, mean, std, 400, stream("swaps"), swapping)).inputs[:, 1]
+    left = float((data.next_observations[last[0], 1] - mean[1]) / std[1])
+    assert left not in (data.observations[:, 1] - mean[1]) / std[1]
+    assert (swapped == left).float().mean().item() == pytest.approx(0.25, abs=0.06)
+    assert (swapped != plain).float().mean().item() == pytest.approx(0.5, abs=0.08)
+
+
+def test_clipping_changes_nothing_of_what_is_learned_and_keeps_the_range() -> None:
+    experience, actions = experience_of(SPACES["continuous"]), SPACES["continuous"]
+    config = IQLConfig(updates=3, width=8, batch_size=16)
+    free = train_iql(experience, actions, config, "clip").weights
+    held = train_iql(experience, actions, replace(config, clip=True), "clip").weights
+    seen = np.concatenate([experience.data.observations, experience.data.next_observations])
+    assert np.array_equal(held.pop("observation_low"), seen.min(axis=0))
+    assert np.array_equal(held.pop("observation_high"), seen.max(axis=0))
+    assert held.keys() == free.keys()
+    assert all(np.array_equal(held[name], free[name]) for name in free)
