@@ -33,9 +33,7 @@ class SweepCommand:
     workers: int | None = None  # default: all cores, or all of the cluster's
     address: str | None = None  # of a Ray cluster to join
     tracking_uri: str | None = None  # MLflow; default: SQLite beside the store; none: off
-    results: Path = Path(
-        "results"
-    )  # kept with the code: RESULTS/<table>/ of a grid, else RESULTS/<name>/
+    results: Path | None = None  # also export: RESULTS/<table>/ of a grid, else RESULTS/<name>/
     plan: bool = False  # only say what there is already, and what a trial takes
 
 

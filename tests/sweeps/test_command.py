@@ -45,6 +45,17 @@ def test_what_a_user_sees(done: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert figures == {"history.svg", "importances.svg", "slices.svg", "alpha-beta.svg"}
 
 
+def test_nothing_is_exported_unless_it_is_asked_for(
+    done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else a small sweep would replace the results that are kept of a large one."""
+    monkeypatch.chdir(tmp_path)
+    words = command(done)
+    place = words.index("--results")
+    main([*words[:place], *words[place + 2 :]])
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_the_plan_alone_runs_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     main(command(tmp_path, "--plan", "--trials", "7"))
     out = capsys.readouterr().out
