@@ -49,11 +49,12 @@ def test_nothing_is_exported_unless_it_is_asked_for(
     done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Else a small sweep would replace the results that are kept of a large one."""
-    monkeypatch.chdir(tmp_path)
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
     words = command(done)
     place = words.index("--results")
     main([*words[:place], *words[place + 2 :]])
-    assert list(tmp_path.iterdir()) == []
+    assert list(Path().iterdir()) == []
 
 
 def test_the_plan_alone_runs_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
