@@ -18,6 +18,7 @@ from orchestrator.errors import IncompleteError, SkillstitchError, UsageError
 from orchestrator.executors import ExecutorKind
 from orchestrator.interruption import interrupted_by_sigterm
 from orchestrator.spec import Spec, packaged_specs
+from orchestrator.store import USUAL_STORE
 from orchestrator.suite import Suite, is_suite, load_asked, part_directories, with_specs
 
 INTERRUPTED, UNREAD, TERMINATED = 130, 141, 143  # as shells count SIGINT, SIGPIPE and SIGTERM
@@ -32,7 +33,7 @@ class PlanCommand:
     """What a spec would train and simulate, and what that costs. Runs nothing."""
 
     spec: OfSpec
-    store: Path = Path("runs/store")  # where artifacts and finished blocks are kept
+    store: Path = USUAL_STORE  # where artifacts and finished blocks are kept
     workers: int | None = None  # to estimate the time for; default: all cores
     from_sweep: str | None = None  # take a finished sweep's winner: its name or directory
 
@@ -43,7 +44,7 @@ class RunCommand:
 
     spec: OfSpec
     out: Path | None = None  # run directory; default: runs/<name>-<scale>
-    store: Path = Path("runs/store")  # where artifacts and finished blocks are kept
+    store: Path = USUAL_STORE  # where artifacts and finished blocks are kept
     executor: ExecutorKind = "ray"  # serial: everything in this process
     workers: int | None = None  # default: all cores, or all of the cluster's
     address: str | None = None  # of a Ray cluster to join, e.g. 10.0.0.1:6379 or auto
@@ -314,7 +315,7 @@ def _gc(words: list[str]) -> None:
 
     def gc(
         runs: tyro.conf.Positional[tuple[Path, ...]],
-        store: Path = Path("runs/store"),
+        store: Path = USUAL_STORE,
         delete: bool = False,
     ) -> None:
         """Find artifacts and blocks that none of the given run directories needs.

@@ -28,12 +28,12 @@ def collect_garbage(store_root: Path, runs: Sequence[Path], *, delete: bool) -> 
     """
     if not runs:
         raise UsageError("name the run directories to keep, for example runs/table1-paper")
-    needed: set[str] = set()
-    for run in map(RunDirectory, runs):
-        needed |= _of_suite(run) if is_suite(run) else _of_run(run)
     if not (store_root / "blocks.sqlite").is_file():
         raise UsageError(f"{store_root} is no store: it has no blocks.sqlite")
     with locking.alone(store_root) if delete else nullcontext():
+        needed: set[str] = set()
+        for run in map(RunDirectory, runs):
+            needed |= _of_suite(run) if is_suite(run) else _of_run(run)
         yield from _collect(Store(store_root), needed, delete=delete)
 
 

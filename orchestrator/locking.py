@@ -5,12 +5,14 @@ from __future__ import annotations
 import fcntl
 import os
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from orchestrator.errors import LockedError
 from orchestrator.store import storage_errors
+
+STORE_LOCK = "in-use.lock"  # another name than a run directory's: the two may be one folder
 
 
 @contextmanager
@@ -31,17 +33,19 @@ def held(folder: Path) -> Iterator[None]:
 
 
 @contextmanager
-def shared(store: Path) -> Iterator[None]:
-    """Use a store beside others. Waits while somebody has it `alone`."""
-    with _locked_file(store / "lock") as descriptor:
-        fcntl.flock(descriptor, fcntl.LOCK_SH)
+def shared(store: Path, say: Callable[[str], None]) -> Iterator[None]:
+    """Use a store beside others. Says so, and waits, where somebody has it `alone`."""
+    with _locked_file(store / STORE_LOCK) as descriptor:
+        if not _take(descriptor, fcntl.LOCK_SH):
+            say(f"waiting for the gc of {store} to end")
+            fcntl.flock(descriptor, fcntl.LOCK_SH)
         yield
 
 
 @contextmanager
 def alone(store: Path) -> Iterator[None]:
     """Have a store that nobody else uses; LockedError at once if somebody does."""
-    with _locked_file(store / "lock") as descriptor:
+    with _locked_file(store / STORE_LOCK) as descriptor:
         if not _take(descriptor, fcntl.LOCK_EX):
             raise LockedError(
                 f"a run or a sweep is at work over {store}, and what it has made and not yet used "

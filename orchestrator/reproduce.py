@@ -28,10 +28,10 @@ from orchestrator.ledger import Ledger
 from orchestrator.plan import Plan, make_plan
 from orchestrator.progress import Progress
 from orchestrator.provenance import provenance
-from orchestrator.rundir import USUAL_STORE, RunDirectory
+from orchestrator.rundir import RunDirectory
 from orchestrator.spec import Spec
 from orchestrator.stopwatch import Stopwatch
-from orchestrator.store import Artifact, Store, storage_errors
+from orchestrator.store import USUAL_STORE, Artifact, Store, storage_errors
 from orchestrator.structure import Plain
 
 NO_TRACKING = "none"
@@ -94,7 +94,7 @@ def reproduce(spec: Spec, settings: Settings, progress: Progress) -> RunDirector
     to be given up (everything else is then finished and reported as partial).
     """
     directory, watch = RunDirectory(settings.out), Stopwatch()
-    with directory.locked(), locking.shared(settings.store):
+    with directory.locked(), locking.shared(settings.store, progress.say):
         run_id = directory.settle(spec)
         directory.uses(settings.store)
         with tracked(directory, settings, progress, watch):

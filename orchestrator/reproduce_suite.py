@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 from analysis.report import build_report
+from orchestrator import locking
 from orchestrator.errors import IncompleteError, SkillstitchError
 from orchestrator.executors import open_executor
 from orchestrator.merge import describe_suite, write_merged
@@ -26,12 +27,13 @@ def reproduce_suite(suite: Suite, settings: Settings, progress: Progress) -> Run
     (all else is then finished, and the tables are marked as partial).
     """
     directory, watch = RunDirectory(settings.out), Stopwatch()
-    with directory.locked():
+    with directory.locked(), locking.shared(settings.store, progress.say):
         run_id = directory.claim(
             describe_suite(suite),
             set().union(*(make_plan(part.spec).scored_kinds for part in suite.parts)),
             lambda: suite_differences(suite_of(directory), suite),
         )
+        directory.uses(settings.store)
         parts = {part.label: part_directory(directory, part.label) for part in suite.parts}
         done = directory.finished and all(part.finished for part in parts.values())
         if not done:

@@ -19,10 +19,9 @@ from orchestrator.methods import first_method, method_label
 from orchestrator.plan import make_plan
 from orchestrator.provenance import matters
 from orchestrator.spec import Spec, TableSpec, differences, spec_from_plain
-from orchestrator.store import write_atomically
+from orchestrator.store import USUAL_STORE, write_atomically
 from orchestrator.structure import Plain, to_plain
 
-USUAL_STORE = Path("runs/store")
 REPORT_SOURCES = (".py", ".csv", ".html", ".css", ".js")
 
 
@@ -31,7 +30,7 @@ class RunDirectory:
 
     spec.json         what was asked, resolved
     identity.json     id of this run, and the versions that must not change under it
-    store             path of the store that it was last carried out over
+    store.json        path of the store that it was last carried out over
     ledger.sqlite     every finished block
     provenance.json   where, when and with what it was made
     segments.parquet, episodes.parquet, training.json, datasets.json, report/
@@ -53,12 +52,11 @@ class RunDirectory:
     @property
     def store_root(self) -> Path:
         """The store that it was last carried out over; the usual one where that is not known."""
-        path = self.path / "store"
-        return Path(path.read_text()) if path.is_file() else USUAL_STORE
+        return Path(self.read_json("store.json") or USUAL_STORE)
 
     def uses(self, store_root: Path) -> None:
         """Remember the store."""
-        write_atomically(self.path / "store", str(store_root.resolve()).encode())
+        self.write_json("store.json", str(store_root.resolve()))
 
     @property
     def played(self) -> bool:
@@ -133,11 +131,14 @@ class RunDirectory:
 
     def write_json(self, name: str, content: Any) -> None:
         text = json.dumps(content, sort_keys=True, indent=1, ensure_ascii=False)
-        write_atomically(self.path / name, (text + "\n").encode())
+        # A path may be any bytes.
+        write_atomically(self.path / name, (text + "\n").encode(errors="surrogateescape"))
 
     def read_json(self, name: str) -> Any:
         path = self.path / name
-        return json.loads(path.read_text()) if path.is_file() else None
+        if not path.is_file():
+            return None
+        return json.loads(path.read_text(encoding="utf-8", errors="surrogateescape"))
 
 
 def analysis_fingerprint() -> str:

@@ -23,6 +23,7 @@ from safetensors.numpy import save as save_safetensors
 
 from orchestrator.errors import IncompleteError, StorageError
 
+USUAL_STORE = Path("runs/store")
 Arrays = dict[str, np.ndarray]
 
 

@@ -15,8 +15,7 @@ from stitching.envs.protocol import Benchmark
 
 
 def configuration(factors: Factors) -> list[int]:
-    """Columns that say where all that matters is: the robot's pose, and the positions of objects
-    that some skill is about."""
+    """Columns of the robot's pose, and of the positions of all objects that a skill is about."""
     names = [name for name in factors.names if name in factors.own.values()]
     positions = [column for name in names for column in factors.objects[name].positions]
     return [*factors.pose, *positions]
@@ -31,8 +30,8 @@ def pair_forecast(
     own held-out starts (`stitching.diagnosis.competence`), e runs over the states in which A's
     held-out demonstrations succeed, and d(e, B) is the distance from e to the nearest start of
     B's. Two states are as far apart as the root mean square difference of their configurations
-    (`configuration`), each number in units of its standard
-    deviation in the held-out data. Nothing here was fitted to a pair.
+    (`configuration`), each number in units of its standard deviation in the held-out data. Nothing
+    here was fitted to a pair.
 
     Without a stitch. A's demonstrations may have moved other objects before A, and e has them as
     they are then; where a pair is played, nothing came before A. A pair is left out if either

@@ -26,18 +26,18 @@ class Initiation:
     columns: list[int]  # of an observation, that make the robot's pose
     scale: Tensor  # (pose,) what they are divided by
     states: list[Tensor]  # by skill: (P, observation); none where nothing is known
-    bystanders: list[list[int]]  # by skill: columns of the objects that it is not about
+    others: list[list[int]]  # by skill: columns of the objects that it is not about
     radii: list[float]  # ε by skill
 
     @classmethod
     def of(cls, arrays: dict[str, np.ndarray]) -> Initiation:
-        """From the artifact: columns, scale, radii, "states.<skill>", "bystanders.<skill>"."""
+        """From the artifact: columns, scale, radii, "states.<skill>", "others.<skill>"."""
         radii = arrays["radii"].tolist()
         return cls(
             arrays["columns"].tolist(),
             torch.from_numpy(arrays["scale"]),
             [torch.from_numpy(arrays[f"states.{skill}"]) for skill in range(len(radii))],
-            [arrays[f"bystanders.{skill}"].tolist() for skill in range(len(radii))],
+            [arrays[f"others.{skill}"].tolist() for skill in range(len(radii))],
             radii,
         )
 
@@ -56,11 +56,11 @@ class Initiation:
     def among_known_objects(self, states: Tensor, skill: int) -> Tensor:
         """The same robots among other objects: (n, observation) → (n, observation).
 
-        Bystanders are as in that state of the set whose pose is nearest.
+        Those that the skill is not about are as in that state of the set whose pose is nearest.
         """
         placed = states.clone()
         nearest = self.states[skill][self._gaps(states, skill).argmin(dim=1)]
-        placed[:, self.bystanders[skill]] = nearest[:, self.bystanders[skill]]
+        placed[:, self.others[skill]] = nearest[:, self.others[skill]]
         return placed
 
     def outside(self, states: Tensor, skill: int) -> Tensor:

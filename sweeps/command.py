@@ -14,6 +14,7 @@ from orchestrator.executors import ExecutorKind
 from orchestrator.progress import ConsoleProgress
 from orchestrator.reproduce import Settings
 from orchestrator.rundir import RunDirectory
+from orchestrator.store import USUAL_STORE
 from orchestrator.tomls import Scale
 from sweeps.costs import plan_lines
 from sweeps.spec import load_sweep, packaged_sweeps
@@ -28,7 +29,7 @@ class SweepCommand:
     scale: Scale = "paper"
     trials: int | None = None  # another budget than the spec's; a finished study goes on with it
     out: Path | None = None  # sweep directory; default: runs/sweep-<name>-<scale>
-    store: Path = Path("runs/store")  # where artifacts and finished blocks are kept
+    store: Path = USUAL_STORE  # where artifacts and finished blocks are kept
     executor: ExecutorKind = "ray"  # serial: everything in this process
     workers: int | None = None  # default: all cores, or all of the cluster's
     address: str | None = None  # of a Ray cluster to join

@@ -47,9 +47,10 @@ def carry_out(
     Raises what a reproduction raises; IncompleteError loses nothing.
     """
     directory = RunDirectory(settings.out)
-    with directory.locked(), locking.shared(settings.store):
+    with directory.locked(), locking.shared(settings.store, progress.say):
         run_id = directory.settle(search_spec(sweep))
         settle(directory, sweep)
+        directory.uses(settings.store)
         study = SweepStudy(sweep, directory.path)
         if study.cut:
             progress.say(f"{study.path}: cut {study.cut} bytes of a line torn by a kill")

@@ -120,7 +120,7 @@ def _initiation_sets(params: Plain, inputs: Inputs) -> Artifact:
     }
     for number, (skill, one) in enumerate(zip(benchmark.skills, sets, strict=True)):
         arrays[f"states.{number}"] = one.states
-        arrays[f"bystanders.{number}"] = np.array(factors.bystanders_of(skill.name), dtype=np.int64)
+        arrays[f"others.{number}"] = np.array(factors.others_than(skill.name), dtype=np.int64)
     return Artifact(arrays, {"sizes": [len(one.states) for one in sets]})
 
 

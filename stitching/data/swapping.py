@@ -26,11 +26,11 @@ def bystanders(data: Transitions, factors: Factors, skills: Sequence[str]) -> np
     Those that stand still throughout and are not what the demonstrated skill is about. None in an
     episode that demonstrates no skill. skills: their names, as `episode_skills` numbers them.
 
-    An object stands still where it moves by less than a tenth of what it usually moves: the median
-    over the demonstrations about it that succeed, or without any the most of all demonstrations.
-    (In units of its deviation over the data, one that is moved in few states would never do so:
-    what is seen of it blurs.) How far an object moves is how far that of its positions does that
-    moves most.
+    An object's move is the largest range of any of its positions in an episode. It stands still
+    where its move is less than a tenth of the usual one: the median over the demonstrations about
+    it that succeed, or, where nothing is about it, its largest move in any episode. So an object of
+    which only noise is seen never stands still, and is never swapped. (A tenth of its deviation
+    over the data would be less than the noise for an object that is moved in few states.)
     """
     ranges = _range(data)  # (E, observation)
     positions = [list(factors.objects[name].positions) for name in factors.names]
@@ -75,9 +75,9 @@ class Swapping:
 
     In a share of the transitions each bystander takes, with probability 0.5, the positions and
     velocities that it has in another state, the same in s and s'. In half of the cases that is the
-    one in which a demonstration about it that succeeded has left it, else any state of the dataset:
-    what is always done last is done in none of the others. An object that no demonstration is
-    about is always taken from any state.
+    one in which a demonstration about it that succeeded has left it, else any state of the dataset,
+    in hardly any of which an object has been moved that is always moved last. An object that no
+    demonstration is about is always taken from any state.
     """
 
     share: float  # of the transitions, in [0, 1]

@@ -37,8 +37,8 @@ class Factors:
         """The objects in the order in which others number them, which no file's order decides."""
         return tuple(sorted(self.objects))
 
-    def bystanders_of(self, skill: str) -> list[int]:
-        """Columns of all objects but the one that a skill is about."""
+    def others_than(self, skill: str) -> list[int]:
+        """Columns of all objects but the one that a skill is about, where it is about one."""
         others = [name for name in self.names if name != self.own.get(skill)]
         return [column for name in others for column in self.objects[name].columns]
 

@@ -1,14 +1,18 @@
 """A whole reproduction on the serial executor: once, again, and after it was stopped."""
 
+import shutil
+import threading
+
 import numpy as np
 import pandas as pd
 import pytest
 
+from orchestrator import locking
 from orchestrator.ledger import Ledger
 from orchestrator.plan import Plan
 from orchestrator.spec import Spec
 from orchestrator.store import Store
-from tests.orchestrator.tiny import Counted, Lines, Place, promised_bytes
+from tests.orchestrator.tiny import Counted, Lines, Place, carry_out, promised_bytes, serially
 
 
 class KilledError(Exception):
@@ -128,3 +132,29 @@ def test_resumes_where_training_ended(
     place.carry_out(spec)
     assert set(counted.built) == set(plan.recipes) - set(written)
     assert promised_bytes(place.out) == expected
+
+
+@pytest.mark.parametrize("store", ["store", "."])
+def test_the_store_may_lie_in_the_run_directory(spec: Spec, trained: Place, store: str) -> None:
+    """As runs/store does for a run with --out runs."""
+    out = trained.root / "runs"
+    shutil.copytree(trained.store_root, out / store, dirs_exist_ok=True)
+    directory = carry_out(spec, serially(out, out / store))
+    assert directory.finished
+    assert directory.store_root == (out / store).resolve()
+
+
+def test_a_run_waits_while_its_store_is_cleaned(spec: Spec, done: Place) -> None:
+    waiting, progress = threading.Event(), Lines()
+
+    def run() -> None:
+        carry_out(spec, serially(done.out, done.store_root), progress)
+        waiting.set()
+
+    with locking.alone(done.store_root):
+        thread = threading.Thread(target=run)
+        thread.start()
+        assert not waiting.wait(0.5)
+    thread.join(60)
+    assert waiting.is_set()
+    assert progress.lines == [f"waiting for the gc of {done.store_root} to end"]

@@ -91,7 +91,7 @@ def stitchers(
         list(maze.factors.pose),
         torch.from_numpy(pose_scale(demonstrations, maze.factors)),
         [torch.from_numpy(one.states) for one in sets],
-        [maze.factors.bystanders_of(skill.name) for skill in maze.skills],
+        [maze.factors.others_than(skill.name) for skill in maze.skills],
         [one.radius for one in sets],
     )
     pairs = {pair: row for row, pair in enumerate(skill_pairs(len(maze.skills)))}

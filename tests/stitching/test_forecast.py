@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stitching.data.transitions import Transitions
-from stitching.envs.kitchen import KITCHEN
+from stitching.envs.kitchen import IDLE, KITCHEN
 from stitching.forecast import configuration, pair_forecast
 from stitching.models.scale import observation_scale
 
@@ -83,3 +83,15 @@ def test_every_ordered_pair_of_skills_that_were_shown_and_succeeded() -> None:
     assert {one["second"] for one in pair_forecast(KITCHEN, missed, OWN)} == {FIRST, SECOND}
     untried = {skill: OWN[skill] for skill in (FIRST, SECOND)}
     assert {one["second"] for one in pair_forecast(KITCHEN, data, untried)} == {FIRST, SECOND}
+
+
+def test_what_no_skill_is_about_is_no_part_of_a_configuration() -> None:
+    """Of such an object only noise is seen, which its small deviation would make large."""
+    columns = configuration(KITCHEN.factors)
+    assert set(KITCHEN.factors.pose) <= set(columns)
+    assert not {column for name in IDLE for column in KITCHEN.factors.objects[name].columns} & set(
+        columns
+    )
+    assert {KITCHEN.factors.objects[skill.name].positions[0] for skill in KITCHEN.skills} <= set(
+        columns
+    )

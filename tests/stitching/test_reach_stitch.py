@@ -1,7 +1,10 @@
 """Reach-Stitch: nothing where the robot is in the set, else plans towards it, at a price."""
 
+from dataclasses import replace
+
 import numpy as np
 import torch
+from torch import Tensor
 
 from stitching.envs.protocol import ActionSpace
 from stitching.models.dynamics import Dynamics, DynamicsConfig
@@ -16,14 +19,15 @@ SETS = Initiation(
     columns=[0, 2],
     scale=torch.tensor([2.0, 0.5]),
     states=[torch.tensor([[0.0, 1.0, 0.0], [6.0, 2.0, 0.0]]), torch.empty(0, 3)],
-    bystanders=[[1], []],
+    others=[[1], []],
     radii=[0.5, float("inf")],
 )
 
 
-def moves_by(*steps: np.ndarray) -> Dynamics:
-    """A linear ensemble: s' = s + a · B, one (2, 3) matrix B a member."""
-    weights = [np.concatenate([np.zeros((3, 3)), step]) for step in steps]
+def moves_by(*steps: np.ndarray, drift: np.ndarray | None = None) -> Dynamics:
+    """A linear ensemble: s' = s + s · A + a · B, one (2, 3) matrix B a member, A alike for all."""
+    own = np.zeros((3, 3)) if drift is None else drift
+    weights = [np.concatenate([own, step]) for step in steps]
     arrays = {
         "observation_mean": np.zeros(3, dtype=np.float32),
         "observation_std": np.ones(3, dtype=np.float32),
@@ -93,11 +97,19 @@ def test_a_price_on_disagreement_keeps_plans_where_members_agree() -> None:
 
 def test_it_plans_among_the_objects_of_the_nearest_start() -> None:
     """Dynamics are asked of objects as they know them, wherever these really are."""
-    states = torch.tensor([[2.0, 77.0, 0.5], [4.5, -77.0, -0.5]])
+    drift = np.zeros((3, 3))
+    drift[1, 2] = 0.001  # what y does depends on the object, wrongly where it was never seen
+    states = torch.tensor([[2.0, 77.0, 0.05], [4.5, -77.0, -0.05]])
     known = SETS.among_known_objects(states, 0)
-    assert known.tolist() == [[2.0, 1.0, 0.5], [4.5, 2.0, -0.5]]
+    assert torch.equal(known, torch.tensor([[2.0, 1.0, 0.05], [4.5, 2.0, -0.05]]))
     assert states[:, 1].tolist() == [77.0, -77.0]
-    proposed, among_known = (
-        reach(SURE).propose(each, None, 0, streams(2)).actions for each in (states, known)
-    )
-    assert np.array_equal(proposed, among_known)
+
+    def proposed(sets: Initiation, states: Tensor) -> np.ndarray:
+        dynamics = moves_by(SURE, drift=drift)
+        stitcher = ReachStitch(sets, dynamics, PLANNER, PLANE, 0.0, "mean", execute=1, limit=20)
+        return stitcher.propose(states, None, 0, streams(2)).actions
+
+    as_they_are = proposed(replace(SETS, others=[[], []]), states)
+    assert np.array_equal(proposed(SETS, states), proposed(SETS, known))
+    gaps = np.abs(proposed(SETS, states) - as_they_are)[:, 0, 1]
+    assert gaps.min() > 0.3

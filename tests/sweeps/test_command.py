@@ -2,19 +2,25 @@
 
 import json
 import shutil
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 from unittest import mock
 
 import pandas as pd
 import pytest
 
+from orchestrator import locking
 from orchestrator.cli import main
+from orchestrator.errors import LockedError
 from orchestrator.progress import Silent
+from orchestrator.rundir import RunDirectory
 from orchestrator.spec import TableSpec
 from sweeps import winner as winners
 from sweeps.candidates import method_of
 from sweeps.figures import draw_figures, paper_gains, pareto_front
+from sweeps.search import run_search
 from sweeps.space import Dimension
 from sweeps.spec import Confirm, load_sweep
 from sweeps.sweep import carry_out
@@ -55,6 +61,23 @@ def test_nothing_is_exported_unless_it_is_asked_for(
     place = words.index("--results")
     main([*words[:place], *words[place + 2 :]])
     assert list(Path().iterdir()) == []
+
+
+def test_a_sweep_knows_its_store_and_uses_it_beside_others(
+    done: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    searched: list[str] = []
+
+    def search(*arguments: Any) -> Iterator[None]:
+        with pytest.raises(LockedError), locking.alone(done / "store"):
+            raise AssertionError("somebody could have deleted what the sweep has made")
+        searched.append("once")
+        return run_search(*arguments)
+
+    monkeypatch.setattr("sweeps.sweep.run_search", search)
+    main(command(done))
+    assert searched == ["once"]
+    assert RunDirectory(done / "sweep").store_root == (done / "store").resolve()
 
 
 def test_the_plan_alone_runs_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -41,8 +41,9 @@ FINGER_POSITIONS = slice(7, 9)  # m
 FINGER_SPEEDS = slice(9, 11)  # m/s
 OBJECTS = slice(11, 25)
 GROUPS = {"gripper": slice(0, 11), "objects": OBJECTS}
-# The pose is what an action can bring back: not the hand's tilt, which no action changes, and so
-# not its quaternion. There is no object, since objects are told relative to the gripper, too.
+# The pose is what an action can bring back. The hand's quaternion is left out, for it has the
+# tilt, which no action changes; the turn, which an action sets, is lost with it. There is no
+# object, since objects are told relative to the gripper, too.
 FACTORS = Factors(pose=(0, 1, 2, 7, 8))
 
 # What the next substep depends on, the solver's warm start included.

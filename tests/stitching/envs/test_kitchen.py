@@ -500,3 +500,10 @@ def test_an_objects_columns_are_its_joints_positions_and_velocities(skill: str) 
 def test_all_that_is_not_the_robot_s_is_an_object_s() -> None:
     owned = [column for one in KITCHEN.factors.objects.values() for column in one.columns]
     assert sorted(owned) == list(range(2 * JOINTS, KITCHEN.observation_size))
+
+
+@pytest.mark.parametrize("skill", SKILLS)
+def test_other_objects_are_all_but_the_skill_s_own(skill: str) -> None:
+    others = KITCHEN.factors.others_than(skill)
+    own = KITCHEN.factors.objects[skill].columns
+    assert sorted([*others, *own]) == list(range(2 * JOINTS, KITCHEN.observation_size))
