@@ -1,4 +1,4 @@
-"""MF-Stitch's policy as it is built and loaded: told of the right skills, begun where it should."""
+"""Models as they are built and loaded: MF-Stitch's policy, and initiation sets."""
 
 from dataclasses import replace
 
@@ -13,8 +13,11 @@ from orchestrator.store import Artifact
 from orchestrator.structure import to_plain
 from stitching.data.maze import MazeDataConfig, skill_demonstrations
 from stitching.data.mixtures import Mixture, skill_pairs
+from stitching.data.transitions import Transitions
+from stitching.envs.kitchen import KITCHEN
 from stitching.envs.maze import MAZE
 from stitching.models.iql import IQLConfig
+from stitching.streams import stream
 
 DEMONSTRATIONS = as_artifact(skill_demonstrations(MAZE, MazeDataConfig(episodes=3), seed=0))
 SKILLS = IQLConfig(updates=40, batch_size=32, learning_rate=1e-2, members=1, width=8, log_every=20)
@@ -51,3 +54,27 @@ def test_fine_tuning_begins_as_the_next_skill(multi_task: bool) -> None:
     for pair, (_, following) in enumerate(skill_pairs(4)):
         actions = models["mf-policy"].act(STATES, pair, noise=None)
         assert np.array_equal(actions, models["agent"].act(STATES, following, noise=None))
+
+
+def test_initiation_sets_know_which_objects_their_skills_are_not_about() -> None:
+    """Two skills of Kitchen are shown, each once, from another state; the last fails."""
+    skills = np.array([0, 5, 1])
+    states = stream("kitchen").normal(size=(3, 5, KITCHEN.observation_size)).astype(np.float32)
+    data = Transitions(
+        observations=states[:, :-1].reshape(12, -1),
+        actions=np.zeros((12, KITCHEN.actions.size), dtype=np.float32),
+        next_observations=states[:, 1:].reshape(12, -1),
+        episode_ends=np.array([4, 8, 12]),
+        episode_skills=skills,
+        episode_successes=np.array([True, True, False]),
+    )
+    recipe = {"benchmark": "kitchen", "factors": to_plain(KITCHEN.factors)}
+    made = BUILDERS["initiation-sets"].make(recipe, {"demonstrations": as_artifact(data)})
+    sets = load_models(KITCHEN, {}, {"initiation-sets": made})["initiation-sets"]
+    assert sets.columns == list(KITCHEN.factors.pose)
+    for number, skill in enumerate(KITCHEN.skills):
+        assert sets.others[number] == KITCHEN.factors.others_than(skill.name)
+        shown = number in (0, 5)
+        assert bool(len(sets.states[number])) == shown == np.isfinite(sets.radii[number])
+    assert torch.equal(sets.states[5][0], torch.from_numpy(states[1, 0]))
+    assert made.info["sizes"] == [len(each) for each in sets.states]
