@@ -28,6 +28,8 @@ def collect_garbage(store_root: Path, runs: Sequence[Path], *, delete: bool) -> 
     """
     if not runs:
         raise UsageError("name the run directories to keep, for example runs/table1-paper")
+    for run in map(RunDirectory, runs):
+        run.asked()
     if not (store_root / "blocks.sqlite").is_file():
         raise UsageError(f"{store_root} is no store: it has no blocks.sqlite")
     with locking.alone(store_root) if delete else nullcontext():

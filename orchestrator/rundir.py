@@ -56,7 +56,8 @@ class RunDirectory:
 
     def uses(self, store_root: Path) -> None:
         """Remember the store."""
-        self.write_json("store.json", str(store_root.resolve()))
+        if (path := str(store_root.resolve())) != self.read_json("store.json"):
+            self.write_json("store.json", path)
 
     @property
     def played(self) -> bool:
