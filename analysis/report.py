@@ -85,7 +85,7 @@ def _build(run_dir: Path) -> tuple[list[Table], Studies, list[Drawn]]:
     tables = [build_table(episodes, run.spec, entry) for entry in run.spec.tables]
     studies = _studies(run)
     with replaced_folder(run_dir / "report") as report:
-        drawn = draw_figures(run, tables, report / "figures")
+        drawn = draw_figures(run, tables, report / "figures", studies.get("forecast"))
         for table in tables:
             name = table.entry.id
             _write(report / f"{name}.md", to_markdown(table) + _markdown_rates(studies))

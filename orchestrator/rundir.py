@@ -5,8 +5,8 @@ from __future__ import annotations
 import hashlib
 import json
 import uuid
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -76,11 +76,9 @@ class RunDirectory:
         else:
             (self.path / "finished").unlink(missing_ok=True)
 
-    @contextmanager
-    def locked(self) -> Iterator[None]:
+    def locked(self) -> AbstractContextManager[None]:
         """Hold the directory; LockedError at once, naming the holder, if somebody else does."""
-        with locking.held(self.path):
-            yield
+        return locking.held(self.path)
 
     def settle(self, spec: Spec) -> str:
         """Claim the directory for a spec, or check that it is the same one; returns the run's id.

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pandas as pd
+
 from analysis.anatomy import begun
 from analysis.figures.anatomy import draw_anatomy
 from analysis.figures.curves import draw_curves
@@ -12,15 +14,19 @@ from analysis.figures.pairs import draw_pairs
 from analysis.figures.scores import draw_scores
 from analysis.figures.showcases import draw_showcases
 from analysis.figures.style import house_style, save
-from analysis.forecast import forecast_table
 from analysis.pairs import shown_orders, shown_pairs
 from analysis.run import Run
 from analysis.tables import Table
 from analysis.writers import seed_note
 
 
-def draw_figures(run: Run, tables: list[Table], folder: Path) -> list[Drawn]:
-    """Draws what the run has data for, in the order of the report."""
+def draw_figures(
+    run: Run, tables: list[Table], folder: Path, forecast: pd.DataFrame | None = None
+) -> list[Drawn]:
+    """Draws what the run has data for, in the order of the report.
+
+    forecast: the run's `analysis.forecast.forecast_table`, where it has one.
+    """
     drawn = []
     with house_style():
         for table in tables:
@@ -41,9 +47,8 @@ def draw_figures(run: Run, tables: list[Table], folder: Path) -> list[Drawn]:
             notes = [(FRAMED, framed), (OWN_FIRSTS, run.spec.own_first_skill & {*pair})]
             caption = PAIRS_CAPTION + "".join(note for note, needed in notes if needed)
             drawn.append(Drawn("pairs", caption, ""))
-        foretold = forecast_table(run)
-        if foretold["trials"].any():
-            save(draw_forecast(foretold, run.spec), folder, "forecast")
+        if forecast is not None and forecast["trials"].any():
+            save(draw_forecast(forecast, run.spec), folder, "forecast")
             drawn.append(Drawn("forecast", FORECAST_CAPTION, ""))
         drawn += _diagnosis(run, folder)
         if any(begun(study) for study in run.anatomy.values()):

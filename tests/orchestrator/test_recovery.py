@@ -57,6 +57,13 @@ def in_a_process(target: Callable[..., None], *arguments: Place) -> multiprocess
     return process  # type: ignore[return-value]
 
 
+def check_undisturbed(place: Place, expected: dict[str, bytes]) -> None:
+    """What was killed or interrupted, and then finished, is as if nothing had happened."""
+    assert promised_bytes(place.out) == expected
+    assert place.directory.finished
+    assert place.directory.read_json("quarantine.json") == []
+
+
 @pytest.fixture(scope="module")
 def duration(tmp_path_factory: pytest.TempPathFactory) -> float:
     """Seconds of an undisturbed run in a process, once the server is there."""
@@ -81,9 +88,7 @@ def test_the_serial_driver_is_killed(
         process.join()
         assert process.exitcode in (-signal.SIGKILL, 0)
     place.carry_out(tiny_spec())
-    assert promised_bytes(place.out) == expected
-    assert place.directory.finished
-    assert place.directory.read_json("quarantine.json") == []
+    check_undisturbed(place, expected)
 
 
 def statuses(place: Place) -> list[str]:
@@ -181,9 +186,7 @@ def test_a_process_of_a_ray_run_is_killed(
         assert code == 0  # the driver sees to it that the work is done again
     else:
         place.carry_out(spec)
-    assert promised_bytes(place.out) == expected
-    assert place.directory.finished
-    assert place.directory.read_json("quarantine.json") == []
+    check_undisturbed(place, expected)
 
 
 # SIGTERM of the driver: when Ray has begun to start, while it trains, and while it plays.
@@ -217,9 +220,7 @@ def test_sigterm_ends_a_ray_run_as_ctrl_c_does(
         time.sleep(0.1)
 
     place.carry_out(spec)
-    assert promised_bytes(place.out) == expected
-    assert place.directory.finished
-    assert place.directory.read_json("quarantine.json") == []
+    check_undisturbed(place, expected)
 
 
 def test_the_victims_are_found(tmp_path: Path) -> None:
