@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from orchestrator.errors import UsageError
 from orchestrator.structure import structure
+from stitching.bounds import Amount, Bounded, Episodes, Few, NotNegative
 from stitching.data.mixtures import Mixture, skill_pairs
 from stitching.envs.first_times import FirstTimes
 from stitching.envs.protocol import Benchmark, EpisodeBlock
@@ -30,13 +31,13 @@ class NoStitchConfig:
 
 
 @dataclass(frozen=True)
-class RandomStitchConfig:
-    limit: int = 5  # most stitching steps between two skills
+class RandomStitchConfig(Bounded):
+    limit: Amount = 5  # most stitching steps between two skills
 
 
 @dataclass(frozen=True)
-class MFStitchConfig:
-    limit: int = 5
+class MFStitchConfig(Bounded):
+    limit: Amount = 5
     mixture: Mixture = "fine-tuned"  # how the paper's "mixed" dataset is read
     training: IQLConfig = IQLConfig()  # the extra policy, learned from it
 
@@ -44,7 +45,7 @@ class MFStitchConfig:
 PlannerName = Literal["random-shooting", "cem"]
 
 
-class PlanningConfig:
+class PlanningConfig(Bounded):
     """What settings of all methods that plan have in common; each declares its own defaults."""
 
     planner: PlannerName
@@ -59,10 +60,10 @@ class PlanningConfig:
 
 @dataclass(frozen=True)
 class MBStitchConfig(PlanningConfig):
-    limit: int = 5
-    execute: int = 1  # actions of each plan carried out before planning again
-    alpha: float = 1.0  # α of Eq. 2, price of the value ensemble's disagreement
-    beta: float = 1.0  # β of Eq. 2, price of the dynamics ensemble's disagreement
+    limit: Amount = 5
+    execute: Few = 1  # actions of each plan carried out before planning again
+    alpha: NotNegative = 1.0  # α of Eq. 2, price of the value ensemble's disagreement
+    beta: NotNegative = 1.0  # β of Eq. 2, price of the dynamics ensemble's disagreement
     norm: Norm = "mean"  # how Eq. 2's second variance becomes a number
     selective: bool = False  # act only on plans that promise more than the present
     price: Price = "end"  # Var(T) of a plan: of its last state, or the mean over its steps
@@ -73,9 +74,9 @@ class MBStitchConfig(PlanningConfig):
 
 @dataclass(frozen=True)
 class ReachStitchConfig(PlanningConfig):
-    limit: int = 20  # most stitching steps before a skill
-    execute: int = 1  # actions of each plan carried out before planning again
-    beta: float = 0.5  # β of Eq. 2, beside a distance in standard deviations
+    limit: Amount = 20  # most stitching steps before a skill
+    execute: Few = 1  # actions of each plan carried out before planning again
+    beta: NotNegative = 0.5  # β of Eq. 2, beside a distance in standard deviations
     norm: Norm = "mean"  # as MB-Stitch's
     planner: PlannerName = "cem"
     random_shooting: RandomShooting = RandomShooting()
@@ -83,11 +84,11 @@ class ReachStitchConfig(PlanningConfig):
 
 
 @dataclass(frozen=True)
-class SinglePolicyConfig:
+class SinglePolicyConfig(Bounded):
     """One policy that is not told which skill is asked for (4.3.1): it takes no skill's vector."""
 
     task: str = ""  # what its demonstrations show, in this order and uncut: "a>b>c"
-    episodes: int = 240  # demonstrations
+    episodes: Episodes = 240  # demonstrations
     training: IQLConfig = IQLConfig()
 
 

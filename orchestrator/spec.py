@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -29,8 +28,9 @@ from orchestrator.methods import (
     method_name,
     parse_method,
 )
-from orchestrator.structure import Plain, merged, nested, structure, to_plain
+from orchestrator.structure import Plain, merged, nested, settings_of, structure, to_plain
 from orchestrator.tomls import Scale, based_fields, read_toml, toml_names
+from stitching.bounds import Bounded, Count, Episodes, Few, Seed
 from stitching.envs.registry import BENCHMARKS
 from stitching.models.dynamics import DynamicsConfig
 from stitching.models.iql import IQLConfig
@@ -52,7 +52,7 @@ class TableSpec:
 
 
 @dataclass(frozen=True)
-class Spec:
+class Spec(Bounded):
     """A reproduction: tasks × methods × seeds × episodes of one benchmark, and its tables."""
 
     name: str
@@ -60,14 +60,14 @@ class Spec:
     benchmark: str
     data: tyro.conf.AvoidSubcommands[DataConfig]
     scale: Scale = "paper"
-    lengths: tuple[int, ...] = ()  # all permutations of these many skills
+    lengths: tuple[Few, ...] = ()  # all permutations of these many skills
     tasks: tuple[str, ...] = ()  # and these tasks, as "a>b>c"
-    step_limits: dict[int, int] = field(default_factory=dict)  # whole task, by its length
+    step_limits: dict[int, Count] = field(default_factory=dict)  # whole task, by its length
     methods: tuple[str, ...] = ("no-stitch", "mb-stitch")  # e.g. mb-stitch[alpha=1,beta=10]
-    seeds: int = 3  # a seed retrains everything
-    episodes: int = 100  # a task, a method and a seed
-    root_seed: int = 0
-    block_episodes: int = 100  # episodes that step together; part of what makes the bytes
+    seeds: Few = 3  # a seed retrains everything
+    episodes: Episodes = 100  # a task, a method and a seed
+    root_seed: Seed = 0
+    block_episodes: Episodes = 100  # episodes that step together; part of what makes the bytes
     rollout: RolloutConfig = RolloutConfig()
     agent: IQLConfig = IQLConfig()
     dynamics: DynamicsConfig = DynamicsConfig()
@@ -79,6 +79,8 @@ class Spec:
     tables: tuple[TableSpec, ...] = ()
 
     def __post_init__(self) -> None:
+        with settings_of(f"spec {self.name}"):
+            super().__post_init__()
         check_spec(self)
 
     @property
@@ -112,7 +114,7 @@ class Spec:
             "single-policy": to_plain(self.single_policy),
         }
         config = merged(settings[name], nested(overrides))
-        return structure(METHODS[name].config, config, f"method {method}")
+        return structure(METHODS[name].config, config, f"spec {self.name}, method {method}")
 
 
 def check_spec(spec: Spec) -> None:
@@ -122,7 +124,6 @@ def check_spec(spec: Spec) -> None:
         known = ", ".join(BENCHMARKS)
         raise UsageError(f"{where}: unknown benchmark {spec.benchmark!r}; there are {known}")
     check_names([spec.name, *(table.id for table in spec.tables)], where)
-    _check_numbers(to_plain(spec), where)
     _check_tasks(spec, where)
     _check_methods(spec, where)
     _check_swaps(spec, where)
@@ -147,36 +148,6 @@ def check_rows(table: TableSpec, where: str) -> None:
         raise UsageError(f"{where}: no rows {table.rows!r}; there are {', '.join(ROW_RULES)}")
 
 
-# Wherever in a spec they stand.
-AT_LEAST_ONE = {
-    "batch_size", "block_episodes", "elites", "episodes", "execute", "hidden_layers", "horizon",
-    "iterations", "log_every", "members", "population", "seeds", "updates", "width",
-}  # fmt: skip
-
-
-# Likewise: shares, from the first to the second, which itself is allowed where it says so.
-SHARES = {
-    "dropout": "[0, 1)", "expectile": "(0, 1)", "gamma": "(0, 1]", "momentum": "[0, 1)",
-    "quality": "[0, 1]", "tau": "(0, 1]", "temperature_discount": "(0, 1]",
-}  # fmt: skip
-
-
-def _check_numbers(plain: Any, where: str) -> None:
-    if isinstance(plain, dict):
-        for name, value in plain.items():
-            if name in AT_LEAST_ONE and value < 1:
-                raise UsageError(f"{where}, {name}: must be at least 1")
-            if name in SHARES and not _within(value, SHARES[name]):
-                raise UsageError(f"{where}, {name}: must lie in {SHARES[name]}")
-            _check_numbers(value, f"{where}, {name}")
-    elif isinstance(plain, float) and not math.isfinite(plain):
-        raise UsageError(f"{where}: {plain} is no finite number")
-
-
-def _within(share: float, bounds: str) -> bool:
-    return 0 < share < 1 or (share == 0 and bounds[0] == "[") or (share == 1 and bounds[-1] == "]")
-
-
 def _check_tasks(spec: Spec, where: str) -> None:
     names = spec.skill_names
     for length in spec.lengths:
@@ -197,9 +168,6 @@ def _check_tasks(spec: Spec, where: str) -> None:
                 f"{where}, step_limits: none for tasks of {len(task)} skills; "
                 f"add step_limits.{len(task)}"
             )
-    for length, limit in spec.step_limits.items():
-        if limit < 1:
-            raise UsageError(f"{where}, step_limits, {length}: must be at least 1")
 
 
 def _check_methods(spec: Spec, where: str) -> None:
@@ -208,7 +176,6 @@ def _check_methods(spec: Spec, where: str) -> None:
     seen: dict[tuple[str, str], str] = {}
     for method in spec.methods:
         config = spec.method_config(method)
-        _check_numbers(to_plain(config), f"{where}, {method}")
         same = seen.setdefault((method_name(method), str(config)), method)
         if same != method or spec.methods.count(method) > 1:
             raise UsageError(f"{where}, methods: {same} and {method} are the same method")

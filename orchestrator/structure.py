@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import types
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import MISSING, fields, is_dataclass
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -28,10 +30,17 @@ def structure(cls: type[T], plain: Any, where: str) -> T:
         raise UsageError(f"{where}: field {missing[0]!r} is missing")
     hints = get_type_hints(cls)
     values = {name: _value(hints[name], value, f"{where}, {name}") for name, value in plain.items()}
-    try:
+    with settings_of(where):
         return cls(**values)
-    except ValueError as error:  # what a dataclass of settings says of values that do not fit
-        raise UsageError(f"{where}: {error}") from error
+
+
+@contextmanager
+def settings_of(where: str) -> Iterator[None]:
+    """What a dataclass of settings says of values that do not fit becomes a UsageError."""
+    try:
+        yield
+    except ValueError as error:
+        raise UsageError(f"{where}, {error}") from error
 
 
 def _value(hint: Any, value: Any, where: str) -> Any:

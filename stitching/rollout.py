@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 import torch
 
+from stitching.bounds import Amount, Bounded, NotNegative
 from stitching.envs.protocol import Benchmark, EpisodeBlock
 from stitching.models.agent import Agent
 from stitching.planning.objective import spread_over_members
@@ -18,17 +19,13 @@ from stitching.streams import stream
 
 
 @dataclass(frozen=True)
-class RolloutConfig:
+class RolloutConfig(Bounded):
     """How skills are executed; step limits of whole tasks belong to the spec."""
 
-    temperature: float = 0.0  # of the policy: 0 its mode, as in IQL's evaluation; 1 as learned
-    skill_limit: int = 0  # most steps of one skill, its stitch included; 0: only the task's own
-    stop_alpha: float = 0.0  # price of the values' disagreement when a stitch asks whether to go on
+    temperature: NotNegative = 0.0  # of the policy: 0 its mode, as in IQL; 1 as learned
+    skill_limit: Amount = 0  # most steps of one skill, its stitch included; 0: the task's own
+    stop_alpha: NotNegative = 0.0  # price of the values' disagreement, to the stop rule
     first_stitch: bool = False  # stitch before a task's first skill, too, as Algorithm 1 is printed
-
-    def __post_init__(self) -> None:
-        if self.temperature < 0:
-            raise ValueError(f"temperature: must not be negative: {self.temperature}")
 
 
 @dataclass(frozen=True)

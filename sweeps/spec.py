@@ -14,8 +14,9 @@ from orchestrator.spec import (
     load_spec,
     spec_from_plain,
 )
-from orchestrator.structure import Plain, merged, structure, to_plain
+from orchestrator.structure import Plain, merged, settings_of, structure, to_plain
 from orchestrator.tomls import Scale, load_toml, toml_names
+from stitching.bounds import Amount, Bounded, Count, Episodes, Inside, Seed, ShareBelowOne
 from stitching.streams import stream
 from sweeps.questions import METRICS, question_of
 from sweeps.questions.question import Question
@@ -23,26 +24,26 @@ from sweeps.space import Space, Value, check_enqueued, check_space, grid_points
 
 
 @dataclass(frozen=True)
-class Pruner:
+class Pruner(Bounded):
     """Gives up trials that Wilcoxon's signed-rank test tells from the best one so far."""
 
-    rounds: int = 1  # parts in which a trial is played, the test after each; 1: never pruned
-    p: float = 0.1  # given up below this p-value
-    startup: int = 12  # instances (task, episode) before the first test
+    rounds: Count = 1  # parts in which a trial is played, the test after each; 1: never pruned
+    p: Inside = 0.1  # given up below this p-value
+    startup: Amount = 12  # instances (task, episode) before the first test
 
 
 @dataclass(frozen=True)
-class Confirm:
+class Confirm(Bounded):
     """How the best trials are judged again, where the search has never been."""
 
-    best: int = 3  # trials; 0: none
-    seeds: tuple[int, ...] = ()  # default: as many as the search had, after them
-    root_seed: int | None = None  # another one makes other data, too; default: the base's
-    episodes: int | None = None  # default: the base's
+    best: Amount = 3  # trials; 0: none
+    seeds: tuple[Amount, ...] = ()  # default: as many as the search had, after them
+    root_seed: Seed | None = None  # another one makes other data, too; default: the base's
+    episodes: Episodes | None = None  # default: the base's
 
 
 @dataclass(frozen=True)
-class SweepSpec:
+class SweepSpec(Bounded):
     """A search over fields of a run spec."""
 
     name: str
@@ -52,16 +53,16 @@ class SweepSpec:
     scale: Scale = "paper"
     settings: Plain = field(default_factory=dict)  # fields of the base, changed for all trials
     tasks: tuple[str, ...] = ()  # the search's; default: the base's, less the held-out
-    searched: int = 0  # so many of these tasks, drawn by the sweep's seed; 0: all
+    searched: Amount = 0  # so many of these tasks, drawn by the sweep's seed; 0: all
     held_out: tuple[str, ...] = ()  # tasks that only confirmation sees
-    held_out_share: float = 0.0  # or this share of the base's tasks, drawn by the sweep's seed
+    held_out_share: ShareBelowOne = 0.0  # or this share of the base's, drawn by the sweep's seed
     sampler: Literal["tpe", "random", "grid"] = "tpe"
-    trials: int = 40  # the grid: all its points
-    batch: int = 4  # trials asked at once; part of what makes the study
-    startup: int = 10  # random trials before TPE begins
+    trials: Count = 40  # the grid: all its points
+    batch: Count = 4  # trials asked at once; part of what makes the study
+    startup: Amount = 10  # random trials before TPE begins
     enqueued: tuple[dict[str, Value], ...] = ()  # the first trials, in this order; may grow
     base_first: bool = True  # the base's own setting is the first trial, where none is enqueued
-    seed: int = 0  # of the sampler
+    seed: Seed = 0  # of the sampler
     objectives: tuple[str, ...] = ("gain",)  # metrics of one of `sweeps.questions`
     constraints: dict[str, float] = field(default_factory=dict)  # metric → most it may be
     pruner: Pruner = Pruner()
@@ -69,6 +70,8 @@ class SweepSpec:
     tables: tuple[TableSpec, ...] = ()  # of a grid: its points beside No-Stitch
 
     def __post_init__(self) -> None:
+        with settings_of(f"sweep {self.name}"):
+            super().__post_init__()
         check_sweep(self)
 
     @property
@@ -91,20 +94,13 @@ class SweepSpec:
 def check_sweep(sweep: SweepSpec) -> None:
     """Refuse what could not be carried out; UsageError says what is valid."""
     where = f"sweep {sweep.name}"
-    for name in ("trials", "batch"):
-        if getattr(sweep, name) < 1:
-            raise UsageError(f"{where}, {name}: must be at least 1")
     if not sweep.objectives or len(set(sweep.objectives)) < len(sweep.objectives):
         raise UsageError(f"{where}, objectives: name one or more, each once")
     question_of([*sweep.objectives, *sweep.constraints], f"{where}, objectives and constraints")
-    if sweep.pruner.rounds < 1 or not 0 < sweep.pruner.p < 1:
-        raise UsageError(f"{where}, pruner: rounds must be at least 1, and 0 < p < 1")
     if sweep.pruner.rounds > 1 and not METRICS[sweep.objectives[0]].by_episode:
         raise UsageError(f"{where}, pruner: compares scores: make gain or score the objective")
     if sweep.pruner.rounds > 1 and len(sweep.objectives) > 1:
         raise UsageError(f"{where}, pruner: works with one objective; set rounds = 1")
-    if not 0 <= sweep.held_out_share < 1:
-        raise UsageError(f"{where}, held_out_share: must lie in [0, 1)")
     if sweep.held_out and sweep.held_out_share:
         raise UsageError(f"{where}: give held_out or held_out_share, not both")
     if sweep.tables and sweep.sampler != "grid":

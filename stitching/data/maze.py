@@ -6,17 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stitching.bounds import Amount, Bounded, Count, Episodes, Share
 from stitching.data.transitions import NO_SKILL, Transitions
 from stitching.envs.maze import MOVES, Cell, Maze
 from stitching.streams import stream
 
 
 @dataclass(frozen=True)
-class MazeDataConfig:
-    episodes: int = 100  # demonstrations a skill
-    noise: float = 0.02  # probability of a random move in them
-    exploration_episodes: int = 200  # random walks from random cells, for the dynamics alone
-    exploration_steps: int = 20
+class MazeDataConfig(Bounded):
+    episodes: Episodes = 100  # demonstrations a skill
+    noise: Share = 0.02  # probability of a random move in them
+    exploration_episodes: Amount = 200  # random walks from random cells, for the dynamics
+    exploration_steps: Count = 20
 
 
 def skill_demonstrations(maze: Maze, config: MazeDataConfig, seed: int) -> Transitions:

@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from stitching.bounds import Bounded, Count, Few, LearningRate, Width
 from stitching.data.transitions import Transitions
 from stitching.models.layers import (
     Activation,
@@ -25,19 +26,19 @@ from stitching.streams import stream
 
 
 @dataclass(frozen=True)
-class DynamicsConfig:
+class DynamicsConfig(Bounded):
     """The paper gives "two or three layers" and the activation; the rest is ours."""
 
-    updates: int = 3_000
-    batch_size: int = 256
-    learning_rate: float = 1e-3
+    updates: Count = 3_000
+    batch_size: Count = 256
+    learning_rate: LearningRate = 1e-3
     learning_rate_decay: bool = True  # cosine to 0
-    members: int = 5
-    width: int = 128
-    hidden_layers: int = 2
+    members: Few = 5
+    width: Width = 128
+    hidden_layers: Few = 2
     activation: Activation = "relu"  # relu in the maze, elu in Kitchen, sigmoid in Robosuite
     precision: Precision = "float32"  # of the hidden layers, while training and predicting
-    log_every: int = 250
+    log_every: Count = 250
 
 
 class Dynamics:

@@ -15,6 +15,20 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from stitching.bounds import (
+    Bounded,
+    Count,
+    Few,
+    FewOrNone,
+    Inside,
+    LearningRate,
+    NotNegative,
+    Share,
+    ShareAboveZero,
+    ShareBelowOne,
+    Width,
+    WidthOrNone,
+)
 from stitching.data.experience import Experience
 from stitching.data.swapping import Swapping
 from stitching.envs.protocol import ActionSpace
@@ -28,32 +42,28 @@ MAX_ADVANTAGE_WEIGHT = 100.0  # as in the authors' implementation
 
 
 @dataclass(frozen=True)
-class IQLConfig:
+class IQLConfig(Bounded):
     """Table 6; widths, members and updates are ours, the paper gives none."""
 
-    updates: int = 10_000
-    batch_size: int = 256
-    learning_rate: float = 3e-4
+    updates: Count = 10_000
+    batch_size: Count = 256
+    learning_rate: LearningRate = 3e-4
     learning_rate_decay: bool = True  # cosine to 0, policy only, as in the authors' implementation
-    dropout: float = 0.1  # policy only, likewise
-    gamma: float = 0.99
-    tau: float = 0.005
-    expectile: float = 0.7
-    temperature: float = 0.5
-    members: int = 5
-    width: int = 64  # of the critics' hidden layers
-    hidden_layers: int = 2
-    policy_width: int = 0  # of the policy's; 0: as the critics
-    policy_layers: int = 0
+    dropout: ShareBelowOne = 0.1  # policy only, likewise
+    gamma: ShareAboveZero = 0.99
+    tau: ShareAboveZero = 0.005
+    expectile: Inside = 0.7
+    temperature: NotNegative = 0.5
+    members: Few = 5
+    width: Width = 64  # of the critics' hidden layers
+    hidden_layers: Few = 2
+    policy_width: WidthOrNone = 0  # of the policy's; 0: as the critics
+    policy_layers: FewOrNone = 0
     precision: Precision = "float32"  # of the hidden layers while training
     multi_task: bool = True  # one set of networks for all skills (Maze, Kitchen), or one a skill
-    swap: float = 0.0  # share of the transitions in which objects that play no part are swapped
+    swap: Share = 0.0  # share of the transitions in which objects that play no part are swapped
     clip: bool = False  # what is seen is held to the range that the data have, number by number
-    log_every: int = 500
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.swap <= 1:
-            raise ValueError(f"swap: must lie in [0, 1]: {self.swap}")
+    log_every: Count = 500
 
     @property
     def policy_hidden(self) -> list[int]:

@@ -7,6 +7,15 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from stitching.bounds import (
+    Bounded,
+    Count,
+    Few,
+    NotNegative,
+    Positive,
+    ShareAboveZero,
+    ShareBelowOne,
+)
 from stitching.envs.protocol import ActionSpace
 from stitching.planning.protocol import Plan, Score
 from stitching.planning.ranking import rankable
@@ -15,7 +24,7 @@ SMALLEST = 1e-3  # share of the weights that not the best elite has, below which
 
 
 @dataclass(frozen=True)
-class CEM:
+class CEM(Bounded):
     """Fits a Gaussian over action sequences to its own best samples until it has converged.
 
     Each problem starts from N(0, 1) and repeats, at iteration t = 0, 1, ...:
@@ -40,18 +49,21 @@ class CEM:
     one, without which σ falls too early: ten elites spread some 5 % less than what they are of.
     """
 
-    population: int = 50  # action sequences sampled an iteration
-    elites: int = 10  # of these, the best, which the Gaussian is fitted to
-    horizon: int = 5  # actions in each sequence
-    iterations: int = 500  # at most; fewer once converged
-    momentum: float = 0.9  # of the soft update: the share of the old μ and σ kept
-    temperature: float = 0.5  # τ_0, in units of the score
-    temperature_discount: float = 0.99  # τ_{t+1} / τ_t
-    tolerance: float = 0.05  # largest σ of a converged Gaussian, in units of the action; 0: never
+    population: Count = 50  # action sequences sampled an iteration
+    elites: Count = 10  # of these, the best, which the Gaussian is fitted to
+    horizon: Few = 5  # actions in each sequence
+    iterations: Count = 500  # at most; fewer once converged
+    momentum: ShareBelowOne = 0.9  # of the soft update: the share of the old μ and σ kept
+    temperature: Positive = 0.5  # τ_0, in units of the score
+    temperature_discount: ShareAboveZero = 0.99  # τ_{t+1} / τ_t
+    tolerance: NotNegative = 0.05  # largest σ of a converged Gaussian, of the action; 0: never
 
     def __post_init__(self) -> None:
-        if not 1 <= self.elites <= self.population:
-            raise ValueError(f"elites must lie in 1..population ({self.population}): {self.elites}")
+        super().__post_init__()
+        if self.elites > self.population:
+            raise ValueError(
+                f"elites: must be at most the population, {self.population}: {self.elites}"
+            )
 
     @torch.no_grad()
     def plan(

@@ -7,17 +7,18 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from stitching.bounds import Bounded, Count, Few
 from stitching.envs.protocol import ActionSpace
 from stitching.planning.protocol import Plan, Score
 from stitching.planning.ranking import rankable
 
 
 @dataclass(frozen=True)
-class RandomShooting:
+class RandomShooting(Bounded):
     """Draws action sequences uniformly and keeps the best; of equals, the first drawn."""
 
-    population: int = 200  # action sequences drawn a problem
-    horizon: int = 5  # actions in each sequence
+    population: Count = 200  # action sequences drawn a problem
+    horizon: Few = 5  # actions in each sequence
 
     @torch.no_grad()
     def plan(

@@ -12,6 +12,14 @@ from typing import Literal
 
 import numpy as np
 
+from stitching.bounds import (
+    Amount,
+    Bounded,
+    Count,
+    Episodes,
+    NotNegative,
+    Share,
+)
 from stitching.data.kitchen.arm import GRIP_OPEN, HOME, Arm
 from stitching.data.kitchen.programs import PROGRAMS, Program, Style, perform, relocate, style
 from stitching.data.kitchen.segments import Episode, Order, Segment, as_transitions, cut
@@ -44,30 +52,26 @@ Source = Literal["orders", "single-skill", "human"]
 
 
 @dataclass(frozen=True)
-class KitchenDataConfig:
+class KitchenDataConfig(Bounded):
     source: Source = "orders"  # several skills in human orders, each alone, or people's recordings
     human: str = ""  # for people's: a Minari id such as D4RL/kitchen/complete-v2, or an .npz file
-    episodes: int = 24  # demonstrations an order
-    first_weights: dict[str, float] = field(default_factory=dict)  # first skill → times as many
-    held_out: int = 8  # more of each order, to judge models by
-    quality: float = 0.9  # of the hand: from 1, a steady expert, down to 0
-    qualities: dict[str, float] = field(default_factory=dict)  # skill → another quality for it
-    ease: int = 0  # steps in which a demonstration's first movement gathers speed; people: some 15
-    elsewhere: float = 0.0  # share of later skills that begin at a free pose, not where one ended
-    skill_steps: int = 160  # after which a skill counts as missed and the demonstration ends
+    episodes: Episodes = 24  # demonstrations an order
+    first_weights: dict[str, NotNegative] = field(default_factory=dict)  # first skill → times
+    held_out: Amount = 8  # more of each order, to judge models by
+    quality: Share = 0.9  # of the hand: from 1, a steady expert, down to 0
+    qualities: dict[str, Share] = field(default_factory=dict)  # skill → another quality for it
+    ease: Amount = 0  # steps in which the first movement gathers speed; people: some 15
+    elsewhere: Share = 0.0  # share of later skills that begin at a free pose, not where one ended
+    skill_steps: Count = 160  # after which a skill counts as missed and the demonstration ends
     return_home: bool = False  # to the start posture before another skill; people do not
     keep_failures: bool = False  # keep the segment of a missed skill, as one without success
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for name in ("first_weights", "qualities"):
             if unknown := sorted(getattr(self, name).keys() - set(SKILLS)):
                 known = ", ".join(SKILLS)
                 raise ValueError(f"{name}: no skill {unknown[0]!r}; there are {known}")
-        for name, share in {"elsewhere": self.elsewhere, **self.qualities}.items():
-            if not 0 <= share <= 1:
-                raise ValueError(f"{name}: must lie in [0, 1]")
-        if any(weight < 0 for weight in self.first_weights.values()) or self.ease < 0:
-            raise ValueError("first_weights and ease: must not be negative")
 
     def demonstrations(self, order: Order) -> int:
         """How many demonstrations of an order a dataset holds."""

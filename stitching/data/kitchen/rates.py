@@ -41,7 +41,6 @@ def success_rates(config: RatesConfig) -> Attempts:
         quality=config.quality, skill_steps=config.steps, return_home=config.return_home
     )
     alone = replace(hand, episodes=config.attempts)
-    together = replace(hand, episodes=config.episodes)
     attempts: Attempts = {}
 
     def record(before: str, segment: Segment) -> None:
@@ -52,7 +51,8 @@ def success_rates(config: RatesConfig) -> Attempts:
         for segments in play(alone, (skill,), config.seed):
             for segment in segments[:1]:
                 record("start", segment)
-    for order in human_orders():
+    for order in human_orders() if config.episodes else ():
+        together = replace(hand, episodes=config.episodes)
         for segments in play(together, order, config.seed):
             for before, segment in pairwise(segments):
                 record(SKILLS[before.skill], segment)

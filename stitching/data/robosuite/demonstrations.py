@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from stitching.bounds import Amount, Bounded, Count, Episodes, Share
 from stitching.data.robosuite.programs import Hand, style
 from stitching.data.transitions import DataError, Transitions
 from stitching.envs.protocol import skill_index
@@ -21,11 +22,11 @@ from stitching.streams import stream
 
 
 @dataclass(frozen=True)
-class RobosuiteDataConfig:
-    quality: float = 1.0  # of the hand: from 1, an expert, down to 0, who misses most of the time
-    episodes: int = 100  # demonstrations a skill
-    held_out: int = 50  # more of each skill, to judge models by
-    skill_steps: int = 40  # actions after which a skill counts as missed
+class RobosuiteDataConfig(Bounded):
+    quality: Share = 1.0  # of the hand: from 1, an expert, down to 0, who misses most of the time
+    episodes: Episodes = 100  # demonstrations a skill
+    held_out: Amount = 50  # more of each skill, to judge models by
+    skill_steps: Count = 40  # actions after which a skill counts as missed
     keep_failures: bool = True  # what a clumsy hand misses is data, too
 
 

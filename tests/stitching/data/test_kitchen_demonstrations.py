@@ -212,10 +212,10 @@ def test_orders_have_more_or_fewer_demonstrations_by_their_first_skill() -> None
     [
         ({"qualities": {"toaster": 0.5}}, "qualities: no skill 'toaster'"),
         ({"first_weights": {"toaster": 0.5}}, "first_weights: no skill 'toaster'"),
-        ({"qualities": {"kettle": 1.5}}, "kettle: must lie in"),
-        ({"elsewhere": -0.1}, "elsewhere: must lie in"),
-        ({"first_weights": {"kettle": -1.0}}, "must not be negative"),
-        ({"ease": -1}, "must not be negative"),
+        ({"qualities": {"kettle": 1.5}}, "qualities, kettle: must be at most 1"),
+        ({"elsewhere": -0.1}, "elsewhere: must be at least 0"),
+        ({"first_weights": {"kettle": -1.0}}, "first_weights, kettle: must be at least 0"),
+        ({"ease": -1}, "ease: must be at least 0"),
     ],
 )
 def test_settings_out_of_range_are_refused(setting: dict[str, Any], message: str) -> None:
