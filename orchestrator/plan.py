@@ -164,8 +164,8 @@ def make_plan(spec: Spec) -> Plan:
     demonstrations = {role: datasets[role] for role, one in made.items() if one.teaches}
     seeds = range(spec.seeds if SKILLS in needed else 0)
     factors = to_plain(BENCHMARKS[spec.benchmark].factors)
-    swapped = {"factors": factors} if spec.agent.swap else {}
-    learner = {"config": to_plain(spec.agent), **swapped, **root}
+    parts = {"factors": factors} if spec.agent.alters else {}
+    learner = {"config": to_plain(spec.agent), **parts, **root}
     agents = {seed: add("agent", {**learner, "seed": seed}, demonstrations) for seed in seeds}
     initiation_sets = {}
     if "initiation-sets" in needed:

@@ -126,7 +126,7 @@ def check_spec(spec: Spec) -> None:
     check_names([spec.name, *(table.id for table in spec.tables)], where)
     _check_tasks(spec, where)
     _check_methods(spec, where)
-    _check_swaps(spec, where)
+    _check_altered_data(spec, where)
     ids = [table.id for table in spec.tables]
     for table in spec.tables:
         check_rows(table, f"{where}, table {table.id}")
@@ -191,22 +191,27 @@ def _check_methods(spec: Spec, where: str) -> None:
             )
 
 
-def _check_swaps(spec: Spec, where: str) -> None:
-    """Only where a row demonstrates one skill, among several objects, are there any to swap."""
+def _check_altered_data(spec: Spec, where: str) -> None:
+    """Only where a row demonstrates one skill, with the robot and objects apart, can it be."""
     learners: dict[str, MethodConfig] = {
         "mf_stitch": spec.mf_stitch,
         "single_policy": spec.single_policy,
         **{method: spec.method_config(method) for method in spec.methods},
     }
     for name, config in learners.items():
-        if isinstance(config, MFStitchConfig | SinglePolicyConfig) and config.training.swap:
-            raise UsageError(f"{where}, {name}, training.swap: only agent.swap swaps objects")
-    if not spec.agent.swap:
+        if isinstance(config, MFStitchConfig | SinglePolicyConfig) and config.training.alters:
+            raise UsageError(
+                f"{where}, {name}, training: only the agent learns with swap and corrections"
+            )
+    if not spec.agent.alters:
         return
     if len(BENCHMARKS[spec.benchmark].factors.objects) < 2:
-        raise UsageError(f"{where}, agent.swap: {spec.benchmark} has no objects to swap")
+        raise UsageError(
+            f"{where}, agent: {spec.benchmark} has no objects apart from the robot, which swap and "
+            "corrections need"
+        )
     if not spec.agent.multi_task:
-        raise UsageError(f"{where}, agent.swap: needs agent.multi_task")
+        raise UsageError(f"{where}, agent: swap and corrections need agent.multi_task")
 
 
 def _check_demonstrated(spec: Spec, config: SinglePolicyConfig, where: str) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from orchestrator.builders.parts import Builder, Inputs
 from orchestrator.store import Artifact
 from orchestrator.structure import Plain, structure
+from stitching.data.corrections import Corrections
 from stitching.data.experience import skill_experience
 from stitching.data.initiation import initiation_set, pose_scale
 from stitching.data.mixtures import mixed_experience, skill_pairs
@@ -50,17 +51,21 @@ def _agent(params: Plain, inputs: Inputs) -> Artifact:
     experience = skill_experience(data, conditions(benchmark))
     actions, labels = benchmark.actions, _labels("agent", params)
     if not config.multi_task:
-        if config.swap:
-            raise NotImplementedError(
-                "networks of one skill each do not learn with objects swapped"
-            )
+        if config.alters:
+            raise NotImplementedError("networks of one skill each do not learn from altered data")
         return _trained(train_single_tasks(experience, actions, config, *labels))
-    swapping = None
-    if config.swap:
-        factors = structure(Factors, params["factors"], "factors")
-        names = [skill.name for skill in benchmark.skills]
-        swapping = Swapping.of(data, factors, names, config.swap)
-    return _trained(train_iql(experience, actions, config, *labels, swapping=swapping))
+    swapping = corrections = None
+    if config.alters:
+        about = (
+            data,
+            structure(Factors, params["factors"], "factors"),
+            [skill.name for skill in benchmark.skills],
+        )
+        swapping = Swapping.of(*about, config.swap) if config.swap else None
+        corrections = Corrections.of(*about, config.corrections) if config.corrections else None
+    return _trained(
+        train_iql(experience, actions, config, *labels, swapping=swapping, corrections=corrections)
+    )
 
 
 def _mf_policy(params: Plain, inputs: Inputs) -> Artifact:

@@ -26,29 +26,39 @@ def bystanders(data: Transitions, factors: Factors, skills: Sequence[str]) -> np
     Those that stand still throughout and are not what the demonstrated skill is about. None in an
     episode that demonstrates no skill. skills: their names, as `episode_skills` numbers them.
 
-    An object's move is the largest range of any of its positions in an episode. It stands still
-    where its move is less than a tenth of the usual one: the median over the demonstrations about
-    it that succeed, or, where nothing is about it, its largest move in any episode. So an object of
-    which only noise is seen never stands still, and is never swapped. (A tenth of its deviation
-    over the data would be less than the noise for an object that is moved in few states.)
+    An object stands still where its move is less than a tenth of the usual one.
     """
-    ranges = _range(data)  # (E, observation)
-    positions = [list(factors.objects[name].positions) for name in factors.names]
-    moves = np.stack([ranges[:, own].max(axis=1) for own in positions], axis=1)  # (E, objects)
-    about = demonstrations_about(data, factors, skills)
-    usual = [
-        np.median(moves[about[:, number], number])
-        if about[:, number].any()
-        else moves[:, number].max()
-        for number in range(len(positions))
-    ]
-    still: np.ndarray = moves < STILL * np.array(usual)
+    still: np.ndarray = _moves(data, factors) < STILL * usual_moves(data, factors, skills)
     for episode, skill in enumerate(data.episode_skills.tolist()):
         if skill < 0:
             still[episode] = False
         elif (own := factors.own.get(skills[skill])) is not None:
             still[episode, factors.names.index(own)] = False
     return still
+
+
+def usual_moves(data: Transitions, factors: Factors, skills: Sequence[str]) -> np.ndarray:
+    """How far each object is moved by those who mean to, (objects,).
+
+    A move is the largest range of any of an object's positions in an episode. The usual one is the
+    median over the demonstrations about the object that succeed, or, where nothing is about it, its
+    largest move in any episode. So an object of which only noise is seen never stands still. (A
+    tenth of its deviation over the data would be less than the noise for an object that is moved
+    in few states.)
+    """
+    moves, about = _moves(data, factors), demonstrations_about(data, factors, skills)
+    usual = [
+        np.median(own[shown]) if shown.any() else own.max()
+        for own, shown in zip(moves.T, about.T, strict=True)
+    ]
+    return np.array(usual)
+
+
+def _moves(data: Transitions, factors: Factors) -> np.ndarray:
+    """How far each object is moved in each episode, (E, objects)."""
+    ranges = _range(data)
+    positions = [list(factors.objects[name].positions) for name in factors.names]
+    return np.stack([ranges[:, own].max(axis=1) for own in positions], axis=1)
 
 
 def demonstrations_about(data: Transitions, factors: Factors, skills: Sequence[str]) -> np.ndarray:

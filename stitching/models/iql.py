@@ -29,6 +29,7 @@ from stitching.bounds import (
     Width,
     WidthOrNone,
 )
+from stitching.data.corrections import Corrections
 from stitching.data.experience import Experience
 from stitching.data.swapping import Swapping
 from stitching.envs.protocol import ActionSpace
@@ -62,8 +63,14 @@ class IQLConfig(Bounded):
     precision: Precision = "float32"  # of the hidden layers while training
     multi_task: bool = True  # one set of networks for all skills (Maze, Kitchen), or one a skill
     swap: Share = 0.0  # share of the transitions in which objects that play no part are swapped
+    corrections: NotNegative = 0.0  # how far the robot is displaced in half of them, in steps
     clip: bool = False  # what is seen is held to the range that the data have, number by number
     log_every: Count = 500
+
+    @property
+    def alters(self) -> bool:
+        """Whether what is learned from is not only what the data hold."""
+        return bool(self.swap or self.corrections)
 
     @property
     def policy_hidden(self) -> list[int]:
@@ -148,6 +155,7 @@ def train_iql(
     *labels: str | int,
     policy_from: Params | None = None,
     swapping: Swapping | None = None,
+    corrections: Corrections | None = None,
 ) -> Trained:
     """Learn value ensemble and policy; all randomness comes from streams named by `labels`.
 
@@ -155,8 +163,8 @@ def train_iql(
     it, so only what is asked later can be held to it.
 
     `policy_from`, of the same shape and with its "log_std", is where the policy starts; the values
-    are learned anew. `swapping` alters the minibatches. Raises FloatingPointError when a loss stops
-    being finite.
+    are learned anew. `swapping` and `corrections` alter the minibatches. Raises FloatingPointError
+    when a loss stops being finite.
     """
     data = experience.data
     mean, std = observation_scale(data.observations)
@@ -183,7 +191,7 @@ def train_iql(
 
     log = CurveLog(config.updates, config.log_every)
     rng = stream("batches", *labels)
-    batches = minibatches(experience, mean, std, config.batch_size, rng, swapping)
+    batches = minibatches(experience, mean, std, config.batch_size, rng, swapping, corrections)
     for update in range(config.updates):
         if config.learning_rate_decay:
             rate = config.learning_rate * cosine(update, config.updates)
@@ -236,8 +244,12 @@ def minibatches(
     batch_size: int,
     rng: np.random.Generator,
     swapping: Swapping | None = None,
+    corrections: Corrections | None = None,
 ) -> Iterator[Batch]:
-    """Endless uniform minibatches, drawn with replacement; `swapping` alters s and s' alike."""
+    """Endless uniform minibatches, drawn with replacement.
+
+    `swapping` alters s and s' alike, `corrections` alter s, a and s'.
+    """
     data = experience.data
     observations = torch.from_numpy((np.asarray(data.observations) - mean) / std)
     next_observations = torch.from_numpy((np.asarray(data.next_observations) - mean) / std)
@@ -251,16 +263,21 @@ def minibatches(
     while True:
         for index in torch.from_numpy(rng.integers(len(rows), size=(256, batch_size))):
             row, condition = rows[index], conditions[condition_ids[index]]
-            now, following = observations[row], next_observations[row]
+            now, following, action = observations[row], next_observations[row], actions[row]
             if swapping is not None:
                 swapped, donors, after = map(torch.from_numpy, swapping.draw(row.numpy(), rng))
                 other = torch.where(
                     after, next_observations[donors, columns], observations[donors, columns]
                 )
                 now, following = (torch.where(swapped, other, own) for own in (now, following))
+            if corrections is not None:
+                displaced = corrections.draw(row.numpy(), action.numpy(), rng)
+                now = now + torch.from_numpy(displaced.now / std)
+                following = following + torch.from_numpy(displaced.following / std)
+                action = action + torch.from_numpy(displaced.actions)
             yield Batch(
                 inputs=torch.cat([now, condition], dim=-1),
-                actions=actions[row],
+                actions=action,
                 next_inputs=torch.cat([following, condition], dim=-1),
                 rewards=rewards[index],
                 continues=continues[index],

@@ -201,10 +201,11 @@ def test_initiation_sets_are_of_the_data_alone(spec: Spec) -> None:
     assert not make_plan(spec).initiation_sets
 
 
-def test_what_objects_are_swapped_names_the_agent() -> None:
+@pytest.mark.parametrize("setting", [{"swap": 0.8}, {"corrections": 1.5}], ids=str)
+def test_what_belongs_together_names_an_agent_that_alters_it(setting: dict[str, float]) -> None:
     kitchen = load_spec("table2", "smoke")
-    swapped = replace(kitchen, agent=replace(kitchen.agent, swap=0.8))
-    agent = make_plan(swapped).recipes[make_plan(swapped).agents[0]]
+    altered = make_plan(replace(kitchen, agent=replace(kitchen.agent, **setting)))
+    agent = altered.recipes[altered.agents[0]]
     assert agent.params["factors"]["own"]["kettle"] == "kettle"
     usual = make_plan(kitchen)
     assert "factors" not in usual.recipes[usual.agents[0]].params

@@ -10,6 +10,7 @@ from scipy.stats import expectile as scipy_expectile
 from scipy.stats import norm
 from torch import Tensor, nn
 
+from stitching.data.corrections import Corrections
 from stitching.data.experience import Experience, skill_experience
 from stitching.data.swapping import Swapping
 from stitching.data.transitions import DataError, Transitions
@@ -594,6 +595,42 @@ def test_half_of_the_swapped_objects_are_as_a_demonstration_left_them() -> None:
     assert left not in (data.observations[:, 1] - mean[1]) / std[1]
     assert (swapped == left).float().mean().item() == pytest.approx(0.25, abs=0.06)
     assert (swapped != plain).float().mean().item() == pytest.approx(0.5, abs=0.08)
+
+
+def test_a_displaced_robot_takes_its_corrected_action_to_another_next_state() -> None:
+    experience = experience_of(SPACES["continuous"])
+    data = experience.data
+    mean, std = observation_scale(data.observations)
+    corrections = Corrections(
+        deviations=np.array([0.5]),
+        pose=np.array([0]),
+        robot=np.array([0, 1]),
+        effect=np.array([[0.2, 0, 0, 0], [0, 0.1, 0, 0]]),
+        back=np.array([[1.0], [0.5], [0], [0]]),
+        free=np.ones(len(data), dtype=bool),
+        size=data.observations.shape[1],
+    )
+    # The same transitions: the first draw from the stream is theirs.
+    batches = [
+        next(minibatches(experience, mean, std, 200, stream("displaced"), None, each))
+        for each in (None, corrections)
+    ]
+    plain, displaced = batches
+    away = (displaced.inputs - plain.inputs)[:, 0].numpy() * std[0]
+    assert (away != 0).mean() == pytest.approx(0.5, abs=0.1)
+    assert torch.equal(plain.inputs[:, 1:], displaced.inputs[:, 1:])
+    change = (displaced.actions - plain.actions).numpy()
+    expected = np.clip(plain.actions.numpy() - away[:, None] @ [[1 / 3, 1 / 6, 0, 0]], -1, 1)
+    assert change[away != 0] == pytest.approx(
+        (expected - plain.actions.numpy())[away != 0], abs=1e-5
+    )
+    assert not change[away == 0].any()
+    further = (displaced.next_inputs - plain.next_inputs)[:, :3].numpy() * std
+    assert further[:, 0] == pytest.approx(away + 0.2 * change[:, 0], abs=1e-5)
+    assert further[:, 1] == pytest.approx(0.1 * change[:, 1], abs=1e-5)
+    assert not further[:, 2].any()
+    assert torch.equal(plain.rewards, displaced.rewards)
+    assert torch.equal(plain.continues, displaced.continues)
 
 
 def test_clipping_changes_nothing_of_what_is_learned_and_keeps_the_range() -> None:

@@ -1,0 +1,117 @@
+"""Corrective labels: the robot is displaced, and its action brings it back to the demonstration.
+
+A policy that imitates steady hands knows nothing of the states beside theirs: on Kitchen's expert
+data it fails most of the time where the arm's joints are off by 0.06 rad. How the robot moves can
+be learned from the same data, and so can the action that would have brought it back. After Ke et
+al. (2024), CCIL: Continuity-based Data Augmentation for Corrective Imitation Learning, which finds
+such labels with learned dynamics. Here a linear model of the robot alone serves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from stitching.data.swapping import STILL, usual_moves
+from stitching.data.transitions import Transitions
+from stitching.envs.factors import NO_OBJECT, Factors
+
+SHARE = 0.5  # of the transitions in which the robot may be displaced
+STEPS_BACK = 3  # in which an action's share of the way would bring the robot back
+KNOWN = 0.9  # of a number's variance: what is explained by less is left as it is
+
+
+@dataclass(frozen=True)
+class Displaced:
+    """What to add to transitions (B,) of the data."""
+
+    now: np.ndarray  # (B, observation) float32
+    actions: np.ndarray  # (B, action) float32; with it an action still lies within [−1, 1]
+    following: np.ndarray  # (B, observation) float32
+
+
+@dataclass(frozen=True)
+class Corrections:
+    """Draws, for a minibatch of transitions, how far the robot is displaced and what it does then.
+
+    The data say how the robot moves: x' − x = A x + B a + c, x being its numbers and velocities,
+    by least squares. In half of the transitions before a demonstration moves the object that it
+    is about, the pose is displaced by δ ~ N(0, σ²), and
+
+        ã  = clip(a − B⁺ δ / 3, −1, 1)
+        s̃' = s' + δ + B (ã − a)
+
+    so that (s̃, ã, s̃') is a transition as the linear model has it: a third of the way back.
+    """
+
+    deviations: np.ndarray  # (displaced,) σ of each number of the pose that is displaced
+    pose: np.ndarray  # (displaced,) their columns
+    robot: np.ndarray  # (known,) all columns whose changes the model explains, these among them
+    effect: np.ndarray  # (known, action) B
+    back: np.ndarray  # (action, displaced) B⁺ of the pose
+    free: np.ndarray  # (N,) bool, transitions in which the robot may be displaced
+    size: int  # numbers of an observation
+
+    @classmethod
+    def of(
+        cls, data: Transitions, factors: Factors, skills: Sequence[str], steps: float
+    ) -> Corrections:
+        """σ is so many steps: the root mean square of what each number changes by in one.
+
+        A number of the pose is displaced if the model explains nine tenths of the variance of its
+        changes. Raises ValueError where that holds for none.
+        """
+        free = before_contact(data, factors, skills)
+        robot = np.flatnonzero(factors.object_of(data.observations.shape[1]) == NO_OBJECT)
+        states = data.observations[free][:, robot].astype(np.float64)
+        changes = data.next_observations[free][:, robot] - states
+        causes = np.concatenate([states, data.actions[free], np.ones((len(states), 1))], axis=1)
+        solution, *_ = np.linalg.lstsq(causes, changes, rcond=None)
+        errors = changes - causes @ solution
+        known = errors.var(axis=0) <= (1 - KNOWN) * changes.var(axis=0)
+        effect = solution[len(robot) : -1].T  # (robot, action)
+        displaced = known & np.isin(robot, factors.pose) & (changes.var(axis=0) > 0)
+        if not displaced.any():
+            raise ValueError("corrections: the data do not tell how actions move the robot")
+        return cls(
+            steps * np.sqrt(np.square(changes[:, displaced]).mean(axis=0)),
+            robot[displaced],
+            robot[known],
+            effect[known],
+            np.linalg.pinv(effect[displaced]),
+            free,
+            data.observations.shape[1],
+        )
+
+    def draw(self, rows: np.ndarray, actions: np.ndarray, rng: np.random.Generator) -> Displaced:
+        """For transitions (B,) int64 and their actions (B, action)."""
+        chosen = (rng.random(len(rows)) < SHARE) & self.free[rows]
+        away = rng.normal(size=(len(rows), len(self.pose))) * self.deviations * chosen[:, None]
+        corrected = np.clip(actions - away @ self.back.T / STEPS_BACK, -1, 1)
+        change = np.where(chosen[:, None], corrected - actions, 0)
+        now = np.zeros((len(rows), self.size), dtype=np.float32)
+        now[:, self.pose] = away
+        following = now.copy()
+        following[:, self.robot] += (change @ self.effect.T).astype(np.float32)
+        return Displaced(now, change.astype(np.float32), following)
+
+
+def before_contact(data: Transitions, factors: Factors, skills: Sequence[str]) -> np.ndarray:
+    """Transitions until a demonstration moves the object that its skill is about, (N,) bool.
+
+    That is, by more than a tenth of what it usually moves, from where it stood at first. A hand
+    that holds an object cannot be displaced alone. All transitions where a skill is about nothing.
+    """
+    usual = usual_moves(data, factors, skills)
+    free = np.ones(len(data), dtype=bool)
+    starts = data.episode_starts
+    for start, end, skill in zip(starts, data.episode_ends, data.episode_skills, strict=True):
+        own = factors.own.get(skills[skill]) if skill >= 0 else None
+        if own is not None:
+            where = data.next_observations[start:end, list(factors.objects[own].positions)]
+            first = data.observations[start, list(factors.objects[own].positions)]
+            moved = np.abs(where - first).max(axis=1) > STILL * usual[factors.names.index(own)]
+            free[start:end] = ~np.logical_or.accumulate(moved)
+    return free
