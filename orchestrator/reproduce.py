@@ -12,6 +12,7 @@ from analysis.episodes import write_episodes
 from analysis.report import build_report
 from orchestrator import locking, tracking
 from orchestrator.building import Builds, verified_artifacts
+from orchestrator.cores import usable_cores
 from orchestrator.errors import (
     BadDataError,
     IncompleteError,
@@ -35,6 +36,7 @@ from orchestrator.store import USUAL_STORE, Artifact, Store, storage_errors
 from orchestrator.structure import Plain
 
 NO_TRACKING = "none"
+MOST_ON_A_CORE = 8  # workers: each holds a copy of torch and of a simulator
 
 
 @dataclass(frozen=True)
@@ -49,8 +51,15 @@ class Settings:
     tracking_uri: str | None = None  # SQLite beside the store; "none" turns tracking off
 
     def __post_init__(self) -> None:
-        if self.workers is not None and self.workers < 1:
+        if self.workers is None:
+            return
+        if self.workers < 1:
             raise UsageError(f"--workers must be at least 1: {self.workers}")
+        if self.address is None and self.workers > (most := MOST_ON_A_CORE * usable_cores()):
+            raise UsageError(
+                f"--workers {self.workers}: at most {most} on this machine's {usable_cores()} "
+                "cores; for more, give the --address of a Ray cluster"
+            )
 
     def resolved_tracking_uri(self) -> str:
         return self.tracking_uri or tracking.default_uri(self.store.parent)

@@ -110,6 +110,13 @@ def test_every_field_of_a_spec_is_an_option(cli: Cli) -> None:
         (["plan", "table1", "--tasks", "g0>g7"], "no skill 'g7'; it has g0, g1, g2, g3"),
         (["plan", "table1", "--executor", "serial"], "--executor"),
         (["run", "table1", "--executor", "slurm"], "ray"),
+        (["plan", "table1", "--data.noise", "5"], "noise: must be at most 1: 5.0"),
+        (["plan", "table1", "--agent.learning-rate", "100"], "learning_rate: must be at most 1"),
+        (["plan", "table1", "--agent.width", "1000000000"], "width: must be at most 16384"),
+        (["plan", "table1", "--episodes", "1000000000"], "episodes: must be at most 100000"),
+        (["plan", "table1", "--rollout.skill-limit", "-1"], "skill_limit: must be at least 0"),
+        (["run", "table1", "--workers", "0"], "--workers must be at least 1: 0"),
+        (["run", "table1", "--workers", "100000"], "give the --address of a Ray cluster"),
         (["gc"], "name the run directories to keep"),
     ],
 )
