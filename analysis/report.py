@@ -18,6 +18,7 @@ from analysis.pairs import both_skills, pair_groups, pair_table, second_skills, 
 from analysis.profile import profiles
 from analysis.profile_text import profile_markdown
 from analysis.rates import HEADER, NOTE, rate_lines, rate_table
+from analysis.results import check_results
 from analysis.run import Run, load_run
 from analysis.skills import permutation_scores
 from analysis.tables import Table, build_table
@@ -36,12 +37,15 @@ def build_report(run_dir: Path) -> Path:
     return run_dir / "report" / "index.html"
 
 
-def export_results(run_dir: Path, results_dir: Path) -> list[Path]:
+def export_results(run_dir: Path, results_dir: Path, *, force: bool = False) -> list[Path]:
     """Writes each table of a run to `results_dir/<table id>/`; returns these folders.
 
     Each takes the place of an older one in one step, and nothing of that one stays. Rebuilds the
-    report first: what is kept can then not be older than the run.
+    report first: what is kept can then not be older than the run. Raises RunError where a folder
+    holds results of a larger scale, unless `force` is set.
     """
+    run = load_run(run_dir)
+    check_results(results_dir, [entry.id for entry in run.spec.tables], run.spec.scale, force)
     tables, studies, drawn = _build(run_dir)
     report = run_dir / "report"
     folders = []
@@ -50,8 +54,9 @@ def export_results(run_dir: Path, results_dir: Path) -> list[Path]:
         folder = results_dir / name
         with replaced_folder(folder) as draft:
             _copy_table(name, report, studies, drawn, draft)
-            provenance = json.dumps(load_run(run_dir).provenance, indent=2, ensure_ascii=False)
-            _write(draft / "provenance.json", provenance + "\n")
+            provenance = run.provenance | {"scale": run.spec.scale}
+            text = json.dumps(provenance, indent=2, sort_keys=True, ensure_ascii=False)
+            _write(draft / "provenance.json", text + "\n")
         folders.append(folder)
     return folders
 

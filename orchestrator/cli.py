@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import Annotated, Any
 import tyro
 from rich.console import Console
 
-from orchestrator.errors import IncompleteError, SkillstitchError, UsageError
+from orchestrator.errors import IncompleteError, SkillstitchError, UsageError, said_to_users
 from orchestrator.executors import ExecutorKind
 from orchestrator.interruption import interrupted_by_sigterm
 from orchestrator.spec import Spec, packaged_specs
@@ -50,6 +49,7 @@ class RunCommand:
     address: str | None = None  # of a Ray cluster to join, e.g. 10.0.0.1:6379 or auto
     tracking_uri: str | None = None  # MLflow; default: SQLite beside the store; none: off
     results: Path | None = None  # also export each table to RESULTS/<table>/
+    force: bool = False  # there, also in place of results of a larger scale
     from_sweep: str | None = None  # take a finished sweep's winner: its name or directory
 
 
@@ -173,6 +173,12 @@ def _run(words: list[str]) -> None:
         command.address,
         command.tracking_uri,
     )
+    if command.results is not None:
+        from analysis.results import check_results
+
+        with said_to_users():
+            names = [table.id for table in asked.tables]
+            check_results(command.results, names, asked.scale, command.force)
     incomplete = None
     with ConsoleProgress(ERRORS) as progress:
         try:
@@ -185,7 +191,7 @@ def _run(words: list[str]) -> None:
                 raise
             incomplete = error
     if command.results is not None:
-        _export(out, command.results)
+        _export(out, command.results, command.force)
     for line in summary_lines(RunDirectory(out)):
         OUTPUT.print(line, markup=False)
     if incomplete is not None:
@@ -198,25 +204,14 @@ def _sweep(words: list[str]) -> None:
     sweep(words, OUTPUT, ERRORS)
 
 
-def _export(run: Path, results: Path) -> None:
+def _export(run: Path, results: Path, force: bool) -> None:
     from analysis.report import export_results
     from orchestrator.rundir import RunDirectory
 
-    with RunDirectory(run).locked(), _clear_errors():
-        folders = export_results(run, results)
+    with RunDirectory(run).locked(), said_to_users():
+        folders = export_results(run, results, force=force)
     for folder in folders:
         OUTPUT.print(f"exported {folder}", markup=False)
-
-
-@contextmanager
-def _clear_errors() -> Iterator[None]:
-    """The analysis refuses with ValueErrors of its own, written for users."""
-    from analysis.run import RunError
-
-    try:
-        yield
-    except RunError as error:
-        raise UsageError(str(error)) from error
 
 
 def _status(words: list[str]) -> None:
@@ -248,23 +243,26 @@ def _report(words: list[str]) -> None:
     from orchestrator.reproduce import catch_up
     from orchestrator.rundir import RunDirectory
 
-    def report(run: tyro.conf.Positional[Path], results: Path | None = None) -> None:
+    def report(
+        run: tyro.conf.Positional[Path], results: Path | None = None, force: bool = False
+    ) -> None:
         """Write a run's tables, figures and report again from its segments.
 
         Args:
             run: the run directory.
             results: also export each table to RESULTS/<table>/.
+            force: there, also in place of results of a larger scale.
         """
         directory = RunDirectory(run)
         suite = is_suite(directory)  # a clear error where there is no run
-        with directory.locked(), _clear_errors():
+        with directory.locked(), said_to_users():
             if suite:
                 merge_again(directory)
             page = run / "report" / "index.html"
             if results is None:
                 build_report(run)
         if results is not None:  # builds it, too
-            _export(run, results)
+            _export(run, results, force)
         OUTPUT.print(f"wrote {page}", markup=False)
         if trouble := catch_up(RunDirectory(run)):
             ERRORS.print(f"tracking: {trouble}", markup=False)
@@ -282,7 +280,7 @@ def _compare(words: list[str]) -> None:
             run_a: a run directory.
             run_b: another; differences are B − A.
         """
-        with _clear_errors():
+        with said_to_users():
             text = comparison_markdown(compare(run_a, run_b), run_a.name, run_b.name)
         OUTPUT.print(text, markup=False)
 

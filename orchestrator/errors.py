@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 
 class SkillstitchError(Exception):
     """Base of everything the command line turns into one clear line and an exit code."""
@@ -47,3 +50,14 @@ class BadDataError(SkillstitchError):
     """A dataset or a training run is unusable: wrong shapes, values that are not finite."""
 
     exit_code = 7
+
+
+@contextmanager
+def said_to_users() -> Iterator[None]:
+    """The analysis refuses with ValueErrors of its own, written for users."""
+    from analysis.run import RunError
+
+    try:
+        yield
+    except RunError as error:
+        raise UsageError(str(error)) from error

@@ -9,7 +9,8 @@ from pathlib import Path
 import tyro
 from rich.console import Console
 
-from orchestrator.errors import UsageError
+from analysis.results import check_results
+from orchestrator.errors import UsageError, said_to_users
 from orchestrator.executors import ExecutorKind
 from orchestrator.progress import ConsoleProgress
 from orchestrator.reproduce import Settings
@@ -17,6 +18,7 @@ from orchestrator.rundir import RunDirectory
 from orchestrator.store import USUAL_STORE
 from orchestrator.tomls import Scale
 from sweeps.costs import plan_lines
+from sweeps.report import results_names
 from sweeps.spec import load_sweep, packaged_sweeps
 from sweeps.sweep import carry_out, default_out
 
@@ -35,6 +37,7 @@ class SweepCommand:
     address: str | None = None  # of a Ray cluster to join
     tracking_uri: str | None = None  # MLflow; default: SQLite beside the store; none: off
     results: Path | None = None  # also export: RESULTS/<table>/ of a grid, else RESULTS/<name>/
+    force: bool = False  # there, also in place of results of a larger scale
     plan: bool = False  # only say what there is already, and what a trial takes
 
 
@@ -61,10 +64,13 @@ def sweep(words: list[str], output: Console, errors: Console) -> None:
         for line in plan_lines(asked, command.store):
             output.print(line, markup=False)
         return
+    if command.results is not None:
+        with said_to_users():
+            check_results(command.results, results_names(asked), asked.scale, command.force)
     with ConsoleProgress(errors) as progress:
         for line in plan_lines(asked, command.store):
             progress.say(line)
-        directory = carry_out(asked, settings, progress, command.results)
+        directory = carry_out(asked, settings, progress, command.results, force=command.force)
     for line in summary_lines(directory):
         output.print(line, markup=False)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import warnings
 from collections.abc import Iterator, Sequence
@@ -13,6 +14,7 @@ from optuna.importance import get_param_importances
 from analysis.figures.drawn import DRAWING
 from analysis.files import replaced_folder
 from analysis.report import export_results
+from analysis.results import check_results
 from analysis.writers import to_csv
 from orchestrator.rundir import RunDirectory
 from orchestrator.structure import Plain
@@ -25,12 +27,23 @@ from sweeps.spec import SweepSpec
 from sweeps.study import SweepStudy
 
 
+def results_names(sweep: SweepSpec) -> list[str]:
+    """The folders of RESULTS/ that a sweep's export writes."""
+    return [table.id for table in sweep.tables] or [sweep.name]
+
+
 def write_report(
-    sweep: SweepSpec, study: SweepStudy, directory: RunDirectory, results: Path | None
+    sweep: SweepSpec,
+    study: SweepStudy,
+    directory: RunDirectory,
+    results: Path | None,
+    *,
+    force: bool = False,
 ) -> None:
     """Write report/, and with `results` also what is kept with the code.
 
     That is RESULTS/<table>/ of a grid, as of any run, and the report itself of any other sweep.
+    Raises RunError where results of a larger scale are there, unless `force` is set.
     """
     trials = directory.read_json("trials.json")
     confirmed = directory.read_json("confirm.json") or {}
@@ -52,15 +65,18 @@ def write_report(
         ]
         _write(folder / "index.md", "\n".join(lines).rstrip() + "\n")
     if results is not None and sweep.tables:
-        for exported in export_results(directory.path / "table", results):
+        for exported in export_results(directory.path / "table", results, force=force):
             for name in figures:
                 for suffix in DRAWING:
                     source = directory.path / "report" / "figures" / f"{name}.{suffix}"
                     shutil.copyfile(source, exported / "figures" / f"sweep-{source.name}")
     elif results is not None:
+        check_results(results, results_names(sweep), sweep.scale, force)
         with replaced_folder(results / sweep.name) as folder:
             shutil.copytree(directory.path / "report", folder, dirs_exist_ok=True)
-            shutil.copyfile(directory.path / "provenance.json", folder / "provenance.json")
+            provenance = (directory.read_json("provenance.json") or {}) | {"scale": sweep.scale}
+            text = json.dumps(provenance, indent=1, sort_keys=True, ensure_ascii=False)
+            _write(folder / "provenance.json", text + "\n")
 
 
 def field_importances(study: SweepStudy) -> dict[str, float]:

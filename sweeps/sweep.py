@@ -31,7 +31,12 @@ def default_out(sweep: SweepSpec) -> Path:
 
 
 def carry_out(
-    sweep: SweepSpec, settings: Settings, progress: Progress, results: Path | None = None
+    sweep: SweepSpec,
+    settings: Settings,
+    progress: Progress,
+    results: Path | None = None,
+    *,
+    force: bool = False,
 ) -> RunDirectory:
     """Search, or go on where an earlier command ended; returns the sweep's directory.
 
@@ -44,7 +49,8 @@ def carry_out(
     table/            of a grid: all its points as one run, with the usual tables
     report/           index.md, trials.csv, confirm.csv, figures
 
-    Raises what a reproduction raises; IncompleteError loses nothing.
+    `results`, `force`: see `write_report`. Raises what a reproduction raises; IncompleteError
+    loses nothing.
     """
     directory = RunDirectory(settings.out)
     with directory.locked(), locking.shared(settings.store, progress.say):
@@ -75,7 +81,7 @@ def carry_out(
                     with arena.quietly():
                         write_table(sweep, arena, directory.path / "table")
                 _write_counts(directory, arena.tally, earlier)
-                write_report(sweep, study, directory, results)
+                write_report(sweep, study, directory, results, force=force)
             finished = True
         finally:
             _write_counts(directory, arena.tally, earlier)
