@@ -25,9 +25,11 @@ def compare(run_a: Path, run_b: Path) -> pd.DataFrame:
     """COLUMNS, one row for each cell that both runs have; the interval is that of B − A.
 
     Everything is over the episodes (seed, task, episode) that both runs played, so `score_a` may
-    differ from the run's own table. Cells without a common episode are left out.
+    differ from the run's own table. Cells without a common episode are left out. Raises
+    NothingToCompareError where none is common, or the runs draw from other random numbers.
     """
     a, b = load_run(run_a), load_run(run_b)
+    _check_common_random_numbers(a.spec, b.spec)
     episodes_a = episodes_from_segments(a.segments, a.spec, a.quarantine)
     episodes_b = episodes_from_segments(b.segments, b.spec, b.quarantine)
     key = ["method", "seed", "task", "episode"]
@@ -46,6 +48,34 @@ def compare(run_a: Path, run_b: Path) -> pd.DataFrame:
                      gain.low, gain.high, gain.pairs, gain.seeds)
                 )  # fmt: skip
     return pd.DataFrame(records, columns=COLUMNS)
+
+
+def _check_common_random_numbers(a: RunSpec, b: RunSpec) -> None:
+    """The same numbers of seed and episode are the same episode only with these alike."""
+    for path in sorted(a.settings.keys() & b.settings.keys()):
+        of_a, of_b = a.settings[path], b.settings[path]
+        if path.rpartition(".")[2] in ("benchmark", "root_seed") and of_a != of_b:
+            raise NothingToCompareError(
+                f"nothing to compare: {a.name} and {b.name} differ in {path} ({of_a} against "
+                f"{of_b}), so no episode of one is an episode of the other"
+            )
+
+
+def settings_apart(run_a: Path, run_b: Path) -> pd.DataFrame:
+    """What was asked differently of two runs: field, a, b. Missing where one has no such field."""
+    a, b = (load_run(run).spec.settings for run in (run_a, run_b))
+    paths = sorted(path for path in a.keys() | b.keys() if a.get(path) != b.get(path))
+    rows = [(path, a.get(path, "–"), b.get(path, "–")) for path in paths]
+    return pd.DataFrame(rows, columns=["field", "a", "b"])
+
+
+def settings_markdown(settings: pd.DataFrame, name_a: str, name_b: str) -> str:
+    """The fields that differ, one a line."""
+    if settings.empty:
+        return "Both runs were asked for the same.\n"
+    lines = [f"| Field | A: {name_a} | B: {name_b} |", "|" + " --- |" * 3]
+    lines += [f"| {row.field} | {row.a} | {row.b} |" for row in settings.itertuples()]
+    return "\n".join(lines) + "\n"
 
 
 def _what_differs(a: RunSpec, b: RunSpec) -> str:

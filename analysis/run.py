@@ -6,7 +6,7 @@ The orchestrator writes these files; this module is the only place that knows th
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -68,6 +68,7 @@ class RunSpec:
     block_episodes: int = 1  # episodes that are played, and lost, together
     parts: tuple[PartEntry, ...] = ()  # the runs that this one was merged from, if it was
     long_task: str = ""  # what Single-Policy learned, uncut; "" of a merged run
+    settings: Mapping[str, object] = field(default_factory=dict)  # all that was asked, by path
 
     @classmethod
     def from_dict(cls, spec: Mapping[str, Any]) -> RunSpec:
@@ -91,6 +92,7 @@ class RunSpec:
                 ),
                 block_episodes=spec.get("spec", {}).get("block_episodes", 1),
                 long_task=spec.get("spec", {}).get("single_policy", {}).get("task", ""),
+                settings=dict(_leaves(spec.get("spec", {}))),
                 parts=tuple(
                     PartEntry(
                         part["label"],
@@ -132,6 +134,18 @@ class RunSpec:
     def task_label(self, task: str) -> str:
         """The name a task goes by in tables: "g0>g1" -> "g0 → g1"."""
         return " → ".join(self.skill_label(skill) for skill in task.split(SEPARATOR))
+
+
+def _leaves(plain: object, path: str = "") -> Iterator[tuple[str, object]]:
+    """{"cem": {"horizon": 3}} → ("cem.horizon", 3); parts go by their labels."""
+    if isinstance(plain, dict) and plain:
+        for name, value in plain.items():
+            yield from _leaves(value, f"{path}.{name}" if path else name)
+    elif isinstance(plain, list) and plain and all(isinstance(part, dict) for part in plain):
+        for number, part in enumerate(plain):
+            yield from _leaves(part, f"{path}.{part.get('label', part.get('id', number))}")
+    else:
+        yield path, plain
 
 
 def _step_limits(plain: Mapping[str, Any]) -> dict[int, int]:

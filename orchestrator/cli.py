@@ -271,7 +271,7 @@ def _report(words: list[str]) -> None:
 
 
 def _compare(words: list[str]) -> None:
-    from analysis.compare import compare, comparison_markdown
+    from analysis.compare import compare, comparison_markdown, settings_apart, settings_markdown
 
     def both(run_a: tyro.conf.Positional[Path], run_b: tyro.conf.Positional[Path]) -> None:
         """Two runs side by side, paired on the episodes that both played.
@@ -282,7 +282,8 @@ def _compare(words: list[str]) -> None:
         """
         with said_to_users():
             text = comparison_markdown(compare(run_a, run_b), run_a.name, run_b.name)
-        OUTPUT.print(text, markup=False)
+            asked = settings_markdown(settings_apart(run_a, run_b), run_a.name, run_b.name)
+        OUTPUT.print(f"{text}\n## What was asked differently\n\n{asked}", markup=False)
 
     tyro.cli(both, args=words, prog="skillstitch compare")
 

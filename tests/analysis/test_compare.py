@@ -4,7 +4,14 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from analysis.compare import COLUMNS, NothingToCompareError, compare, comparison_markdown
+from analysis.compare import (
+    COLUMNS,
+    NothingToCompareError,
+    compare,
+    comparison_markdown,
+    settings_apart,
+    settings_markdown,
+)
 from analysis.writers import seed_note
 
 
@@ -63,6 +70,42 @@ def test_says_why_nothing_can_be_compared(
     run_b = write_run(tmp_path / "b", spec={**spec_dict(), **change})
     with pytest.raises(NothingToCompareError, match=reason):
         compare(run_a, run_b)
+
+
+ASKED = {
+    "benchmark": "maze",
+    "root_seed": 0,
+    "mb_stitch": {"alpha": 1.0, "cem": {"horizon": 5}},
+    "tables": [{"id": "table1", "paper": "1"}],
+}
+
+
+@pytest.mark.parametrize("what", [{"root_seed": 7}, {"benchmark": "kitchen"}], ids=str)
+def test_other_random_numbers_are_not_paired(
+    tmp_path: Path, spec_dict: Any, write_run: Any, what: dict[str, Any]
+) -> None:
+    run_a = write_run(tmp_path / "a", spec=spec_dict() | {"spec": ASKED})
+    run_b = write_run(tmp_path / "b", spec=spec_dict() | {"spec": ASKED | what})
+    with pytest.raises(NothingToCompareError, match=f"differ in {next(iter(what))}"):
+        compare(run_a, run_b)
+    merged = [
+        spec_dict() | {"spec": {"parts": [{"label": "x", "spec": asked}]}}
+        for asked in (ASKED, ASKED | what)
+    ]
+    runs = [write_run(tmp_path / f"m{n}", spec=spec) for n, spec in enumerate(merged)]
+    with pytest.raises(NothingToCompareError, match=rf"parts\.x\.spec\.{next(iter(what))}"):
+        compare(*runs)
+
+
+def test_fields_that_differ_are_listed(tmp_path: Path, spec_dict: Any, write_run: Any) -> None:
+    other = ASKED | {"mb_stitch": {"alpha": 5.0, "cem": {"horizon": 5}}, "new": True}
+    run_a = write_run(tmp_path / "a", spec=spec_dict() | {"spec": ASKED})
+    run_b = write_run(tmp_path / "b", spec=spec_dict() | {"spec": other})
+    apart = settings_apart(run_a, run_b)
+    assert apart.to_numpy().tolist() == [["mb_stitch.alpha", 1.0, 5.0], ["new", "–", True]]
+    assert "| mb_stitch.alpha | 1.0 | 5.0 |" in settings_markdown(apart, "a", "b")
+    same = settings_markdown(settings_apart(run_a, run_a), "a", "a")
+    assert same == "Both runs were asked for the same.\n"
 
 
 def test_an_unfinished_run_has_nothing_yet(
