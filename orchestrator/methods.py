@@ -80,7 +80,7 @@ class ReachStitchConfig(PlanningConfig):
     norm: Norm = "mean"  # as MB-Stitch's
     planner: PlannerName = "cem"
     random_shooting: RandomShooting = RandomShooting()
-    cem: CEM = CEM(iterations=40, momentum=0.5, tolerance=0.15)
+    cem: CEM = CEM(horizon=2, iterations=40, momentum=0.5, tolerance=0.15)
 
 
 @dataclass(frozen=True)

@@ -72,8 +72,9 @@ class Initiation:
 class ReachStitch:
     """Plan towards the next skill's initiation set; nothing where the robot is in it already.
 
-    A plan maximises E[−d(s')] − β·Var(T(s'|s, a)), s' being the state after the last action. Var(T)
-    is that of Eq. 2; E is the mean over the members of the dynamics, each at its own s'. s is the
+    A plan maximises E[−d(s')] − β·Var(T(s'|s, a)), on average over its steps: asked of its end
+    alone, the first step, which is all that is executed, need not bring the robot nearer. Var(T) is
+    that of Eq. 2; E is the mean over the members of the dynamics, each at its own s'. s is the
     present state with the objects that the next skill is not about as they were where it was
     demonstrated to begin: dynamics know nothing of cabinets that never stood open in the data, and
     the robot moves alike beside them.
@@ -109,7 +110,7 @@ class ReachStitch:
 
     def _imagine(self, starts: Tensor, sequences: Tensor, following: int) -> Tensor:
         """The objective of sequences, (n, observation), (n, horizon, action) → (n,)."""
-        end = self.dynamics.imagine(starts, sequences)  # (D, n, observation)
-        nearness = -self.initiation.distances(end, following)  # (D, n)
-        price = NORMS[self.norm](spread_over_members(self.dynamics.scaled(end)))
-        return nearness.mean(dim=0) - self.beta * price
+        path = self.dynamics.imagine_path(starts, sequences)  # (D, horizon, n, observation)
+        nearness = -self.initiation.distances(path, following).mean(dim=0)  # (horizon, n)
+        price = NORMS[self.norm](spread_over_members(self.dynamics.scaled(path)))
+        return (nearness - self.beta * price).mean(dim=0)

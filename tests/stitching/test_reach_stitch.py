@@ -95,6 +95,23 @@ def test_a_price_on_disagreement_keeps_plans_where_members_agree() -> None:
     assert dear[1] < -0.3  # y is as sure as before
 
 
+def test_a_plan_is_judged_by_all_of_its_steps() -> None:
+    """In numpy, float64: the mean over steps of nearness less the members' disagreement."""
+    other = 1.5 * SURE
+    starts, rng = np.array([[2.0, 0.0, 1.0], [5.0, 3.0, -0.5]]), stream("plans")
+    sequences = rng.uniform(-1, 1, size=(2, 4, 2))
+    expected = []
+    for state, actions in zip(starts, sequences, strict=True):
+        paths = state + np.stack([np.cumsum(actions @ member, axis=0) for member in (SURE, other)])
+        poses = paths[..., [0, 2]] / [2.0, 0.5]  # (members, steps, pose)
+        gaps = [np.linalg.norm(poses - place, axis=-1) for place in ([0.0, 0.0], [3.0, 0.0])]
+        spread = paths.std(axis=0).mean(axis=-1)  # (steps,)
+        expected.append((-np.minimum(*gaps).mean(axis=0) - 0.7 * spread).mean())
+    tensors = (torch.tensor(each, dtype=torch.float32) for each in (starts, sequences))
+    found = reach(SURE, other, beta=0.7)._imagine(*tensors, following=0)
+    np.testing.assert_allclose(found.numpy(), expected, atol=1e-5)
+
+
 def test_it_plans_among_the_objects_of_the_nearest_start() -> None:
     """Dynamics are asked of objects as they know them, wherever these really are."""
     drift = np.zeros((3, 3))
