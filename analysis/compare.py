@@ -51,14 +51,30 @@ def compare(run_a: Path, run_b: Path) -> pd.DataFrame:
 
 
 def _check_common_random_numbers(a: RunSpec, b: RunSpec) -> None:
-    """The same numbers of seed and episode are the same episode only with these alike."""
-    for path in sorted(a.settings.keys() & b.settings.keys()):
-        of_a, of_b = a.settings[path], b.settings[path]
-        if path.rpartition(".")[2] in ("benchmark", "root_seed") and of_a != of_b:
+    """Episodes of the same seed and number are the same only by the same root seed."""
+    of_a, of_b = _root_seeds(a), _root_seeds(b)
+    if of_a and of_b and not of_a.keys() & of_b.keys():
+        raise NothingToCompareError(
+            f"nothing to compare: {a.name} is played in {_some(of_a)}, {b.name} in {_some(of_b)}"
+        )
+    for benchmark in sorted(of_a.keys() & of_b.keys()):
+        if of_a[benchmark] != of_b[benchmark]:
             raise NothingToCompareError(
-                f"nothing to compare: {a.name} and {b.name} differ in {path} ({of_a} against "
-                f"{of_b}), so no episode of one is an episode of the other"
+                f"nothing to compare: the root seeds of {benchmark} differ, "
+                f"{_some(of_a[benchmark])} in {a.name} and {_some(of_b[benchmark])} in {b.name}: "
+                "the same number is another episode there"
             )
+
+
+def _root_seeds(spec: RunSpec) -> dict[str, list[object]]:
+    """Benchmark → root seeds, of all parts."""
+    seeds: dict[str, set[object]] = {}
+    for path, benchmark in spec.settings.items():
+        whole, _, last = path.rpartition(".")
+        if last == "benchmark":
+            seed = spec.settings.get(f"{whole}.root_seed" if whole else "root_seed")
+            seeds.setdefault(str(benchmark), set()).add(seed)
+    return {benchmark: sorted(each, key=str) for benchmark, each in seeds.items()}
 
 
 def settings_apart(run_a: Path, run_b: Path) -> pd.DataFrame:
@@ -73,7 +89,9 @@ def settings_markdown(settings: pd.DataFrame, name_a: str, name_b: str) -> str:
     """The fields that differ, one a line."""
     if settings.empty:
         return "Both runs were asked for the same.\n"
-    lines = [f"| Field | A: {name_a} | B: {name_b} |", "|" + " --- |" * 3]
+    missing = "“–”: that run has no such field; another version of skillstitch may have written it."
+    lines = [missing, ""] if (settings == "–").any(axis=None) else []
+    lines += [f"| Field | A: {name_a} | B: {name_b} |", "|" + " --- |" * 3]
     lines += [f"| {row.field} | {row.a} | {row.b} |" for row in settings.itertuples()]
     return "\n".join(lines) + "\n"
 

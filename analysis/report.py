@@ -1,6 +1,5 @@
 """From a run directory to its report, and from there to the results kept with the code."""
 
-import json
 import shutil
 from collections.abc import Iterable
 from pathlib import Path
@@ -18,7 +17,7 @@ from analysis.pairs import both_skills, pair_groups, pair_table, second_skills, 
 from analysis.profile import profiles
 from analysis.profile_text import profile_markdown
 from analysis.rates import HEADER, NOTE, rate_lines, rate_table
-from analysis.results import check_results
+from analysis.results import check_results, provenance_text
 from analysis.run import Run, load_run
 from analysis.skills import permutation_scores
 from analysis.tables import Table, build_table
@@ -42,10 +41,10 @@ def export_results(run_dir: Path, results_dir: Path, *, force: bool = False) -> 
 
     Each takes the place of an older one in one step, and nothing of that one stays. Rebuilds the
     report first: what is kept can then not be older than the run. Raises RunError where a folder
-    holds results of a larger scale, unless `force` is set.
+    holds larger results, unless `force` is set.
     """
     run = load_run(run_dir)
-    check_results(results_dir, [entry.id for entry in run.spec.tables], run.spec.scale, force)
+    check_results(results_dir, [entry.id for entry in run.spec.tables], run.spec.extent, force)
     tables, studies, drawn = _build(run_dir)
     report = run_dir / "report"
     folders = []
@@ -54,9 +53,7 @@ def export_results(run_dir: Path, results_dir: Path, *, force: bool = False) -> 
         folder = results_dir / name
         with replaced_folder(folder) as draft:
             _copy_table(name, report, studies, drawn, draft)
-            provenance = run.provenance | {"scale": run.spec.scale}
-            text = json.dumps(provenance, indent=2, sort_keys=True, ensure_ascii=False)
-            _write(draft / "provenance.json", text + "\n")
+            _write(draft / "provenance.json", provenance_text(run.provenance, run.spec.extent))
         folders.append(folder)
     return folders
 

@@ -6,39 +6,62 @@ import json
 import os
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 from analysis.run import RunError
 
 SCALES = ("smoke", "quick", "standard", "paper")  # from the smallest
+Extent = dict[str, str | int]
+"""How much there is of results: {"scale": "quick", "seeds": 1, "episodes": 10, …}."""
 
 
-def check_results(results: Path, names: Iterable[str], scale: str, force: bool) -> None:
-    """Raise RunError where results/<name>/ cannot be written, or holds those of a larger scale.
+def check_results(results: Path, names: Iterable[str], extent: Extent, force: bool) -> None:
+    """Raise RunError where results/<name>/ cannot be written, or holds larger ones.
 
-    Asked before a run, so that it does not end in vain, and again when its tables are written. With
-    `force` any scale replaces any other. What says no scale is replaced.
+    Larger is what has a larger scale, or more of anything that both extents tell. Asked before a
+    run, so that it does not end in vain, and again when its tables are written. With `force`
+    anything is replaced; so is what tells no extent.
     """
-    existing = next(path for path in (results, *results.absolute().parents) if path.exists())
-    if not existing.is_dir() or not os.access(existing, os.W_OK | os.X_OK):
+    try:
+        existing = next(
+            path for path in (results, *results.absolute().parents) if os.path.lexists(path)
+        )
+        usable = existing.is_dir() and os.access(existing, os.W_OK | os.X_OK)
+        results.stat() if usable and existing == results else results.parent.exists()
+    except OSError as error:
+        raise RunError(f"{results}: cannot be written to ({error.strerror})") from error
+    if not usable:
         raise RunError(f"{results}: {existing} is no folder that can be written to; name another")
     for name in names:
-        kept = scale_of(results / name)
-        if kept is not None and not force and SCALES.index(scale) < SCALES.index(kept):
-            raise RunError(
-                f"{results / name} holds results of {kept} scale, which is larger than {scale}: "
-                "export to another folder, or say --force to replace them"
-            )
+        kept = extent_of(results / name)
+        for what in kept.keys() & extent.keys():
+            if not force and _size(extent[what]) < _size(kept[what]):
+                raise RunError(
+                    f"{results / name} holds more, {what} {kept[what]} against {extent[what]}: "
+                    "export to another folder, or say --force to replace it"
+                )
 
 
-def scale_of(folder: Path) -> str | None:
-    """The scale of the results in a folder; None where there are none, or they do not say."""
+def _size(value: str | int) -> int:
+    return SCALES.index(value) if isinstance(value, str) else value
+
+
+def provenance_text(provenance: dict[str, Any], extent: Extent) -> str:
+    """What an exported folder's provenance.json says."""
+    said = provenance | {"extent": extent}
+    return json.dumps(said, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
+
+
+def extent_of(folder: Path) -> Extent:
+    """Of the results in a folder; {} where there are none, or they do not say."""
     file = folder / "provenance.json"
     try:
-        scale = json.loads(file.read_text(encoding="utf-8")).get("scale")
+        extent: Extent = json.loads(file.read_text(encoding="utf-8")).get("extent", {})
+        scale = extent.get("scale", SCALES[0])
     except FileNotFoundError:
-        return None
+        return {}
     except (ValueError, AttributeError, OSError) as error:
         raise RunError(f"{file}: unreadable ({error}); move it away") from error
-    if scale is not None and scale not in SCALES:
+    if scale not in SCALES or not all(isinstance(value, str | int) for value in extent.values()):
         raise RunError(f"{file}: no scale {scale!r}; there are {', '.join(SCALES)}; move it away")
-    return scale
+    return extent

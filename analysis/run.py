@@ -108,6 +108,16 @@ class RunSpec:
             raise RunError(f"spec.json has no {missing}: another version wrote it") from None
 
     @property
+    def extent(self) -> dict[str, str | int]:
+        """How much was asked for: see analysis.results."""
+        return {
+            "scale": self.scale,
+            "seeds": len(self.seeds),
+            "episodes": self.episodes,
+            "tasks": len(self.tasks),
+        }
+
+    @property
     def by_part(self) -> list[RunSpec]:
         """The spec of each part alone; this one if it has none."""
         return [

@@ -49,7 +49,7 @@ class RunCommand:
     address: str | None = None  # of a Ray cluster to join, e.g. 10.0.0.1:6379 or auto
     tracking_uri: str | None = None  # MLflow; default: SQLite beside the store; none: off
     results: Path | None = None  # also export each table to RESULTS/<table>/
-    force: bool = False  # there, also in place of results of a larger scale
+    force: bool = False  # let the exported tables replace larger ones
     from_sweep: str | None = None  # take a finished sweep's winner: its name or directory
 
 
@@ -143,9 +143,11 @@ def _plan(words: list[str]) -> None:
     from orchestrator.ledger import Ledger
     from orchestrator.plan import make_plan
     from orchestrator.printing import forecast_lines, plan_lines, suite_plan_lines
+    from orchestrator.reproduce import check_workers
     from orchestrator.store import Store
 
     command, asked = _with_spec(PlanCommand, "plan", words)
+    check_workers(command.workers)
     if isinstance(asked, Suite):
         lines = suite_plan_lines(asked, command.store, command.workers)
     else:
@@ -178,7 +180,7 @@ def _run(words: list[str]) -> None:
 
         with said_to_users():
             names = [table.id for table in asked.tables]
-            check_results(command.results, names, asked.scale, command.force)
+            check_results(command.results, names, asked.extent, command.force)
     incomplete = None
     with ConsoleProgress(ERRORS) as progress:
         try:
@@ -251,7 +253,7 @@ def _report(words: list[str]) -> None:
         Args:
             run: the run directory.
             results: also export each table to RESULTS/<table>/.
-            force: there, also in place of results of a larger scale.
+            force: let the exported tables replace larger ones.
         """
         directory = RunDirectory(run)
         suite = is_suite(directory)  # a clear error where there is no run

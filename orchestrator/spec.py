@@ -95,6 +95,16 @@ class Spec(Bounded):
         return list(dict.fromkeys(drawn + named))
 
     @property
+    def extent(self) -> dict[str, str | int]:
+        """How much is asked for: see analysis.results."""
+        return {
+            "scale": self.scale,
+            "seeds": self.seeds,
+            "episodes": self.episodes,
+            "tasks": len(self.all_tasks),
+        }
+
+    @property
     def step_limit(self) -> int:
         """Episodes are played to the longest limit of their benchmark and cut afterwards."""
         return max(self.step_limits.values())
@@ -192,7 +202,7 @@ def _check_methods(spec: Spec, where: str) -> None:
 
 
 def _check_altered_data(spec: Spec, where: str) -> None:
-    """Only where a row demonstrates one skill, with the robot and objects apart, can it be."""
+    """What `swap` and `corrections` need: rows of one skill each, the robot and objects apart."""
     learners: dict[str, MethodConfig] = {
         "mf_stitch": spec.mf_stitch,
         "single_policy": spec.single_policy,
@@ -205,10 +215,10 @@ def _check_altered_data(spec: Spec, where: str) -> None:
             )
     if not spec.agent.alters:
         return
-    if len(BENCHMARKS[spec.benchmark].factors.objects) < 2:
+    if not BENCHMARKS[spec.benchmark].factors.objects:
         raise UsageError(
-            f"{where}, agent: {spec.benchmark} has no objects apart from the robot, which swap and "
-            "corrections need"
+            f"{where}, agent: what {spec.benchmark} shows does not tell its robot from objects, "
+            "which swap and corrections need"
         )
     if not spec.agent.multi_task:
         raise UsageError(f"{where}, agent: swap and corrections need agent.multi_task")

@@ -58,6 +58,16 @@ class Suite:
         check_suite(self)
 
     @property
+    def extent(self) -> dict[str, str | int]:
+        """How much is asked for: see analysis.results."""
+        specs = [part.spec for part in self.parts]
+        return {
+            "scale": self.scale,
+            "seeds": max(spec.seeds for spec in specs),
+            "episodes": max(spec.episodes for spec in specs),
+        }
+
+    @property
     def by_variant(self) -> bool:
         """Whether a row is a part: then each part's methods are methods of their own."""
         return any(table.rows == "variant" for table in self.tables)

@@ -21,6 +21,7 @@ WidthOrNone = Annotated[int, Interval(ge=0, le=2**14)]
 Few = Annotated[int, Interval(ge=1, le=1000)]  # members, layers, seeds, steps of a plan
 FewOrNone = Annotated[int, Interval(ge=0, le=1000)]
 Episodes = Annotated[int, Interval(ge=1, le=10**5)]
+SeedNumber = Annotated[int, Interval(ge=0, lt=1000)]  # one of a spec's seeds
 Seed = Annotated[int, Interval(ge=0, lt=2**63)]
 
 Positive = Annotated[float, Interval(gt=0)]

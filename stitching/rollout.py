@@ -24,7 +24,7 @@ class RolloutConfig(Bounded):
 
     temperature: NotNegative = 0.0  # of the policy: 0 its mode, as in IQL; 1 as learned
     skill_limit: Amount = 0  # most steps of one skill, its stitch included; 0: the task's own
-    stop_alpha: NotNegative = 0.0  # price of the values' disagreement, to the stop rule
+    stop_alpha: NotNegative = 0.0  # price of the values' disagreement when a stitch may stop
     first_stitch: bool = False  # stitch before a task's first skill, too, as Algorithm 1 is printed
 
 

@@ -37,7 +37,7 @@ class SweepCommand:
     address: str | None = None  # of a Ray cluster to join
     tracking_uri: str | None = None  # MLflow; default: SQLite beside the store; none: off
     results: Path | None = None  # also export: RESULTS/<table>/ of a grid, else RESULTS/<name>/
-    force: bool = False  # there, also in place of results of a larger scale
+    force: bool = False  # let the exported tables replace larger ones
     plan: bool = False  # only say what there is already, and what a trial takes
 
 
@@ -66,8 +66,8 @@ def sweep(words: list[str], output: Console, errors: Console) -> None:
         return
     if command.results is not None:
         with said_to_users():
-            check_results(command.results, results_names(asked), asked.scale, command.force)
-    with ConsoleProgress(errors) as progress:
+            check_results(command.results, results_names(asked), asked.extent, command.force)
+    with ConsoleProgress(errors) as progress, said_to_users():
         for line in plan_lines(asked, command.store):
             progress.say(line)
         directory = carry_out(asked, settings, progress, command.results, force=command.force)

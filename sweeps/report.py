@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import warnings
 from collections.abc import Iterator, Sequence
@@ -14,7 +13,7 @@ from optuna.importance import get_param_importances
 from analysis.figures.drawn import DRAWING
 from analysis.files import replaced_folder
 from analysis.report import export_results
-from analysis.results import check_results
+from analysis.results import check_results, provenance_text
 from analysis.writers import to_csv
 from orchestrator.rundir import RunDirectory
 from orchestrator.structure import Plain
@@ -43,7 +42,7 @@ def write_report(
     """Write report/, and with `results` also what is kept with the code.
 
     That is RESULTS/<table>/ of a grid, as of any run, and the report itself of any other sweep.
-    Raises RunError where results of a larger scale are there, unless `force` is set.
+    Raises RunError where larger results are there, unless `force` is set.
     """
     trials = directory.read_json("trials.json")
     confirmed = directory.read_json("confirm.json") or {}
@@ -71,12 +70,11 @@ def write_report(
                     source = directory.path / "report" / "figures" / f"{name}.{suffix}"
                     shutil.copyfile(source, exported / "figures" / f"sweep-{source.name}")
     elif results is not None:
-        check_results(results, results_names(sweep), sweep.scale, force)
+        check_results(results, results_names(sweep), sweep.extent, force)
         with replaced_folder(results / sweep.name) as folder:
             shutil.copytree(directory.path / "report", folder, dirs_exist_ok=True)
-            provenance = (directory.read_json("provenance.json") or {}) | {"scale": sweep.scale}
-            text = json.dumps(provenance, indent=1, sort_keys=True, ensure_ascii=False)
-            _write(folder / "provenance.json", text + "\n")
+            provenance = directory.read_json("provenance.json") or {}
+            _write(folder / "provenance.json", provenance_text(provenance, sweep.extent))
 
 
 def field_importances(study: SweepStudy) -> dict[str, float]:

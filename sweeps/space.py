@@ -17,6 +17,7 @@ from optuna.distributions import (
 from orchestrator.errors import UsageError
 from orchestrator.spec import Spec, spec_from_plain
 from orchestrator.structure import Plain, merged, nested, to_plain
+from stitching.bounds import Bounded, FewOrNone
 
 Value = int | float | bool | str
 Fields = dict[str, Value]  # path in a run spec, as "mb_stitch.cem.population", → value
@@ -25,7 +26,7 @@ MOST_CORNERS = 512
 
 
 @dataclass(frozen=True)
-class Dimension:
+class Dimension(Bounded):
     """One searched field: either some `choices`, or all numbers from `low` to `high`."""
 
     choices: tuple[Value, ...] = ()
@@ -33,7 +34,7 @@ class Dimension:
     high: int | float | None = None
     log: bool = False  # search, or lay the grid, on a logarithmic scale
     integer: bool = False
-    points: int = 0  # of the grid, from low to high
+    points: FewOrNone = 0  # of the grid, from low to high
 
     def check(self, where: str) -> None:
         """UsageError says what is wrong with the range."""

@@ -16,7 +16,16 @@ from orchestrator.spec import (
 )
 from orchestrator.structure import Plain, merged, settings_of, structure, to_plain
 from orchestrator.tomls import Scale, load_toml, toml_names
-from stitching.bounds import Amount, Bounded, Count, Episodes, Inside, Seed, ShareBelowOne
+from stitching.bounds import (
+    Amount,
+    Bounded,
+    Count,
+    Episodes,
+    Inside,
+    Seed,
+    SeedNumber,
+    ShareBelowOne,
+)
 from stitching.streams import stream
 from sweeps.questions import METRICS, question_of
 from sweeps.questions.question import Question
@@ -37,7 +46,7 @@ class Confirm(Bounded):
     """How the best trials are judged again, where the search has never been."""
 
     best: Amount = 3  # trials; 0: none
-    seeds: tuple[Amount, ...] = ()  # default: as many as the search had, after them
+    seeds: tuple[SeedNumber, ...] = ()  # default: as many as the search had, after them
     root_seed: Seed | None = None  # another one makes other data, too; default: the base's
     episodes: Episodes | None = None  # default: the base's
 
@@ -84,6 +93,17 @@ class SweepSpec(Bounded):
         """The grid's, in order; none for other samplers."""
         where = f"sweep {self.name}, space"
         return grid_points(self.space, where) if self.sampler == "grid" else []
+
+    @property
+    def extent(self) -> dict[str, str | int]:
+        """How much is asked for: see analysis.results."""
+        base = base_spec(self)
+        return {
+            "scale": self.scale,
+            "seeds": base.seeds,
+            "episodes": base.episodes,
+            "trials": self.budget,
+        }
 
     @property
     def budget(self) -> int:

@@ -15,11 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from stitching.data.swapping import STILL, usual_moves
-from stitching.data.transitions import Transitions
+from stitching.data.transitions import DataError, Transitions
 from stitching.envs.factors import NO_OBJECT, Factors
 
 SHARE = 0.5  # of the transitions in which the robot may be displaced
 STEPS_BACK = 3  # in which an action's share of the way would bring the robot back
+FARTHEST = 3  # deviations by which a number is displaced at most
 KNOWN = 0.9  # of a number's variance: what is explained by less is left as it is
 
 
@@ -41,14 +42,16 @@ class Corrections:
     is about, the pose is displaced by δ ~ N(0, σ²), and
 
         ã  = clip(a − B⁺ δ / 3, −1, 1)
-        s̃' = s' + δ + B (ã − a)
+        x̃' = x' + δ + A δ + B (ã − a)
 
-    so that (s̃, ã, s̃') is a transition as the linear model has it: a third of the way back.
+    so that it makes a transition as the linear model has it, about a third of the way back. δ is
+    cut off at three deviations.
     """
 
     deviations: np.ndarray  # (displaced,) σ of each number of the pose that is displaced
     pose: np.ndarray  # (displaced,) their columns
     robot: np.ndarray  # (known,) all columns whose changes the model explains, these among them
+    drift: np.ndarray  # (known, displaced) A
     effect: np.ndarray  # (known, action) B
     back: np.ndarray  # (action, displaced) B⁺ of the pose
     free: np.ndarray  # (N,) bool, transitions in which the robot may be displaced
@@ -61,7 +64,7 @@ class Corrections:
         """σ is so many steps: the root mean square of what each number changes by in one.
 
         A number of the pose is displaced if the model explains nine tenths of the variance of its
-        changes. Raises ValueError where that holds for none.
+        changes. Raises DataError where that holds for none.
         """
         free = before_contact(data, factors, skills)
         robot = np.flatnonzero(factors.object_of(data.observations.shape[1]) == NO_OBJECT)
@@ -71,14 +74,16 @@ class Corrections:
         solution, *_ = np.linalg.lstsq(causes, changes, rcond=None)
         errors = changes - causes @ solution
         known = errors.var(axis=0) <= (1 - KNOWN) * changes.var(axis=0)
+        drift = solution[: len(robot)].T  # (robot, robot)
         effect = solution[len(robot) : -1].T  # (robot, action)
         displaced = known & np.isin(robot, factors.pose) & (changes.var(axis=0) > 0)
         if not displaced.any():
-            raise ValueError("corrections: the data do not tell how actions move the robot")
+            raise DataError("corrections: the data do not tell how actions move the robot")
         return cls(
             steps * np.sqrt(np.square(changes[:, displaced]).mean(axis=0)),
             robot[displaced],
             robot[known],
+            drift[np.ix_(known, displaced)],
             effect[known],
             np.linalg.pinv(effect[displaced]),
             free,
@@ -88,14 +93,23 @@ class Corrections:
     def draw(self, rows: np.ndarray, actions: np.ndarray, rng: np.random.Generator) -> Displaced:
         """For transitions (B,) int64 and their actions (B, action)."""
         chosen = (rng.random(len(rows)) < SHARE) & self.free[rows]
-        away = rng.normal(size=(len(rows), len(self.pose))) * self.deviations * chosen[:, None]
+        noise = rng.normal(size=(len(rows), len(self.pose))).clip(-FARTHEST, FARTHEST)
+        away = noise * self.deviations * chosen[:, None]
         corrected = np.clip(actions - away @ self.back.T / STEPS_BACK, -1, 1)
         change = np.where(chosen[:, None], corrected - actions, 0)
         now = np.zeros((len(rows), self.size), dtype=np.float32)
         now[:, self.pose] = away
         following = now.copy()
-        following[:, self.robot] += (change @ self.effect.T).astype(np.float32)
+        following[:, self.robot] += away @ self.drift.T + change @ self.effect.T
         return Displaced(now, change.astype(np.float32), following)
+
+    def widened(self, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The range of all that is drawn, given that of the data: (observation,) each."""
+        reach = np.zeros(self.size)
+        reach[self.robot] = 2 * np.abs(self.effect).sum(axis=1)  # an action changes by 2 at most
+        reach[self.robot] += FARTHEST * np.abs(self.drift) @ self.deviations
+        reach[self.pose] += FARTHEST * self.deviations
+        return (low - reach).astype(np.float32), (high + reach).astype(np.float32)
 
 
 def before_contact(data: Transitions, factors: Factors, skills: Sequence[str]) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from stitching.bounds import Bounded, Count, Few, LearningRate, Width
+from stitching.bounds import Amount, Bounded, Count, Few, LearningRate, Width
 from stitching.data.transitions import Transitions
 from stitching.models.layers import (
     Activation,
@@ -29,7 +29,7 @@ from stitching.streams import stream
 class DynamicsConfig(Bounded):
     """The paper gives "two or three layers" and the activation; the rest is ours."""
 
-    updates: Count = 3_000
+    updates: Amount = 3_000  # 0: untrained
     batch_size: Count = 256
     learning_rate: LearningRate = 1e-3
     learning_rate_decay: bool = True  # cosine to 0

@@ -16,6 +16,7 @@ import torch
 from torch import Tensor
 
 from stitching.bounds import (
+    Amount,
     Bounded,
     Count,
     Few,
@@ -46,7 +47,7 @@ MAX_ADVANTAGE_WEIGHT = 100.0  # as in the authors' implementation
 class IQLConfig(Bounded):
     """Table 6; widths, members and updates are ours, the paper gives none."""
 
-    updates: Count = 10_000
+    updates: Amount = 10_000  # 0: untrained
     batch_size: Count = 256
     learning_rate: LearningRate = 3e-4
     learning_rate_decay: bool = True  # cosine to 0, policy only, as in the authors' implementation
@@ -63,7 +64,7 @@ class IQLConfig(Bounded):
     precision: Precision = "float32"  # of the hidden layers while training
     multi_task: bool = True  # one set of networks for all skills (Maze, Kitchen), or one a skill
     swap: Share = 0.0  # share of the transitions in which objects that play no part are swapped
-    corrections: NotNegative = 0.0  # how far the robot is displaced in half of them, in steps
+    corrections: NotNegative = 0.0  # steps by which the robot is displaced in half of the others
     clip: bool = False  # what is seen is held to the range that the data have, number by number
     log_every: Count = 500
 
@@ -209,6 +210,8 @@ def train_iql(
     weights = {"observation_mean": mean, "observation_std": std}
     if config.clip:
         low, high = observation_range(data.observations, data.next_observations)
+        if corrections is not None:
+            low, high = corrections.widened(low, high)
         weights |= {"observation_low": low, "observation_high": high}
     for prefix, params in (("q", q), ("v", v), ("policy", policy | {"log_std": log_std})):
         weights |= prefixed(params, prefix)

@@ -56,7 +56,7 @@ class CEM(Bounded):
     momentum: ShareBelowOne = 0.9  # of the soft update: the share of the old μ and σ kept
     temperature: Positive = 0.5  # τ_0, in units of the score
     temperature_discount: ShareAboveZero = 0.99  # τ_{t+1} / τ_t
-    tolerance: NotNegative = 0.05  # largest σ of a converged Gaussian, of the action; 0: never
+    tolerance: NotNegative = 0.05  # largest σ when converged, in units of the action; 0: never
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -2,72 +2,90 @@
 
 import json
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import pytest
 
 from analysis.report import export_results
-from analysis.results import SCALES, check_results, scale_of
+from analysis.results import SCALES, Extent, check_results, extent_of, provenance_text
 from analysis.run import RunError
-from orchestrator.tomls import Scale
+
+EXTENT: Extent = {"scale": "quick", "seeds": 2, "episodes": 10}
 
 
-def test_every_scale_has_a_rank() -> None:
-    assert sorted(SCALES) == sorted(get_args(Scale))
+def test_scales_are_ranked_from_the_smallest() -> None:
+    assert SCALES == ("smoke", "quick", "standard", "paper")
 
 
-def kept(results: Path, scale: object) -> Path:
+def kept(results: Path, extent: Extent) -> Path:
     folder = results / "table1"
     folder.mkdir(parents=True)
-    (folder / "provenance.json").write_text(json.dumps({"scale": scale}))
+    (folder / "provenance.json").write_text(provenance_text({"cpu": "any"}, extent))
     return folder
 
 
-@pytest.mark.parametrize("scale", SCALES)
-@pytest.mark.parametrize("there", SCALES)
-def test_only_a_larger_scale_is_in_the_way(tmp_path: Path, there: str, scale: str) -> None:
-    kept(tmp_path, there)
-    check_results(tmp_path, ["table1"], scale, force=True)
-    check_results(tmp_path, ["table2"], scale, force=False)
-    if SCALES.index(scale) >= SCALES.index(there):
-        check_results(tmp_path, ["table1"], scale, force=False)
+@pytest.mark.parametrize(
+    ("changes", "larger"),
+    [
+        ({}, ""),
+        ({"scale": "paper", "seeds": 3, "episodes": 11}, ""),
+        ({"tasks": 1}, ""),  # of which what is kept says nothing
+        ({"scale": "smoke"}, "scale quick against smoke"),
+        ({"scale": "paper", "seeds": 1}, "seeds 2 against 1"),
+        ({"scale": "paper", "episodes": 9}, "episodes 10 against 9"),
+    ],
+    ids=str,
+)
+def test_what_is_larger_stays(tmp_path: Path, changes: dict[str, Any], larger: str) -> None:
+    kept(tmp_path, EXTENT)
+    asked = EXTENT | changes
+    check_results(tmp_path, ["table1"], asked, force=True)
+    check_results(tmp_path, ["table2"], asked, force=False)
+    if larger:
+        with pytest.raises(RunError, match=f"table1 holds more, {larger}.*--force"):
+            check_results(tmp_path, ["table2", "table1"], asked, force=False)
     else:
-        with pytest.raises(RunError, match=f"table1 holds results of {there} scale.*--force"):
-            check_results(tmp_path, ["table2", "table1"], scale, force=False)
+        check_results(tmp_path, ["table1"], asked, force=False)
 
 
-@pytest.mark.parametrize("text", ["{", "[]", '{"scale": "huge"}'])
+@pytest.mark.parametrize(
+    "text", ["{", "[]", '{"extent": {"scale": "huge"}}', '{"extent": {"seeds": [3]}}']
+)
 def test_what_cannot_be_read_is_not_replaced(tmp_path: Path, text: str) -> None:
-    (kept(tmp_path, "paper") / "provenance.json").write_text(text)
+    (kept(tmp_path, EXTENT) / "provenance.json").write_text(text)
     with pytest.raises(RunError, match=r"provenance\.json: .*move it away"):
-        check_results(tmp_path, ["table1"], "paper", force=False)
+        check_results(tmp_path, ["table1"], EXTENT, force=False)
 
 
-def test_a_file_in_the_way_is_found_before_anything_runs(tmp_path: Path) -> None:
+def test_a_folder_that_takes_nothing_is_found_before_anything_runs(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    with pytest.raises(RunError, match="no folder that can be written to"):
-        check_results(tmp_path / "file" / "results", ["table1"], "paper", force=False)
-    check_results(tmp_path / "not" / "yet", ["table1"], "paper", force=False)
-    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+    (tmp_path / "link").symlink_to(tmp_path / "nowhere")
+    for unusable in ("file", "file/results", "link", "link/results"):
+        with pytest.raises(RunError, match="no folder that can be written to"):
+            check_results(tmp_path / unusable, ["table1"], EXTENT, force=False)
+    with pytest.raises(RunError, match="name too long"):
+        check_results(tmp_path / ("a" * 300), ["table1"], EXTENT, force=False)
+    check_results(tmp_path / "not" / "yet", ["table1"], EXTENT, force=False)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "link"]
 
 
-def test_an_export_says_its_scale_and_keeps_to_it(tmp_path: Path, write_run: Any) -> None:
+def test_an_export_says_its_extent_and_keeps_to_it(tmp_path: Path, write_run: Any) -> None:
     run_dir = write_run(tmp_path / "run", training=None, showcase=None)
     (folder,) = export_results(run_dir, tmp_path / "results")
-    scale = json.loads((run_dir / "spec.json").read_text())["scale"]
-    assert scale_of(folder) == scale
-    provenance = folder / "provenance.json"
-    provenance.write_text(provenance.read_text().replace(f'"{scale}"', '"paper"'))
+    extent = extent_of(folder)
+    assert extent == {"scale": "smoke", "seeds": 3, "episodes": 10, "tasks": 60}
+    (folder / "provenance.json").write_text(provenance_text({}, extent | {"seeds": 4}))
     before = {path: path.read_bytes() for path in folder.iterdir() if path.is_file()}
-    if scale != "paper":
-        with pytest.raises(RunError, match="paper scale"):
-            export_results(run_dir, tmp_path / "results")
-        assert before == {path: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+    with pytest.raises(RunError, match="seeds 4 against 3"):
+        export_results(run_dir, tmp_path / "results")
+    assert before == {path: path.read_bytes() for path in folder.iterdir() if path.is_file()}
     export_results(run_dir, tmp_path / "results", force=True)
-    assert scale_of(folder) == scale
+    assert extent_of(folder) == extent
 
 
-def test_all_that_is_committed_says_its_scale() -> None:
+def test_all_that_is_committed_says_how_much_it_is() -> None:
     folders = list((Path(__file__).parents[2] / "results").iterdir())
     assert len(folders) >= 8
-    assert all(scale_of(folder) in SCALES for folder in folders)
+    for folder in folders:
+        provenance = json.loads((folder / "provenance.json").read_text())
+        assert {"scale", "seeds", "episodes"} <= provenance["extent"].keys(), folder.name

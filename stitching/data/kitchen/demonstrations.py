@@ -56,7 +56,8 @@ class KitchenDataConfig(Bounded):
     source: Source = "orders"  # several skills in human orders, each alone, or people's recordings
     human: str = ""  # for people's: a Minari id such as D4RL/kitchen/complete-v2, or an .npz file
     episodes: Episodes = 24  # demonstrations an order
-    first_weights: dict[str, NotNegative] = field(default_factory=dict)  # first skill → times
+    # First skill of an order → times as many demonstrations of it.
+    first_weights: dict[str, NotNegative] = field(default_factory=dict)
     held_out: Amount = 8  # more of each order, to judge models by
     quality: Share = 0.9  # of the hand: from 1, a steady expert, down to 0
     qualities: dict[str, Share] = field(default_factory=dict)  # skill → another quality for it

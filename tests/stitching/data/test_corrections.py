@@ -19,6 +19,7 @@ FACTORS = Factors(
 )
 SKILLS = ("open", "fill", "wave")
 EFFECT = np.array([[0.1, 0.02], [0.0, 0.05]])  # of two actions on the two joints
+SAG = 0.05  # of a joint's distance from 0, lost in a step
 STEPS, TOUCHED = 20, 12
 
 
@@ -30,7 +31,7 @@ def made_up(skill: int, moved: int | None, seed: int) -> Transitions:
     states[:, [5, 6]] = rng.normal(size=2)
     states[0, :2] = rng.normal(size=2)
     for step, action in enumerate(actions):
-        states[step + 1, :2] = states[step, :2] + EFFECT @ action
+        states[step + 1, :2] = (1 - SAG) * states[step, :2] + EFFECT @ action
         states[step + 1, 3:5] = EFFECT @ action
     states[:, 2] = rng.normal(scale=0.01, size=STEPS + 1)
     if moved is not None:
@@ -53,6 +54,7 @@ def test_the_data_say_how_actions_move_the_robot() -> None:
     known = CORRECTIONS.robot.tolist()
     assert known == [0, 1, 3, 4]
     assert CORRECTIONS.effect[:2] == pytest.approx(EFFECT, abs=1e-4)
+    assert CORRECTIONS.drift[:2] == pytest.approx(-SAG * np.eye(2), abs=1e-4)
     changes = (DATA.next_observations - DATA.observations)[CORRECTIONS.free][:, :2]
     assert CORRECTIONS.deviations == pytest.approx(1.5 * np.sqrt((changes**2).mean(axis=0)))
 
@@ -61,7 +63,8 @@ def test_a_displaced_transition_is_one_that_the_robot_could_have_made() -> None:
     states = DATA.observations[ROWS] + DRAWN.now
     actions = DATA.actions[ROWS] + DRAWN.actions
     following = DATA.next_observations[ROWS] + DRAWN.following
-    assert following[:, :2] == pytest.approx(states[:, :2] + actions @ EFFECT.T, abs=1e-4)
+    expected = (1 - SAG) * states[:, :2] + actions @ EFFECT.T
+    assert following[:, :2] == pytest.approx(expected, abs=1e-4)
     assert np.abs(actions).max() <= 1 + 1e-6
 
 
@@ -69,7 +72,8 @@ def test_a_third_of_the_way_back_where_the_action_allows_it() -> None:
     inside = (np.abs(DATA.actions[ROWS] + DRAWN.actions) < 0.999).all(axis=1) & DISPLACED
     assert inside.sum() > 1000
     remaining = DRAWN.following[inside][:, :2]
-    assert remaining == pytest.approx((1 - 1 / STEPS_BACK) * DRAWN.now[inside][:, :2], abs=1e-4)
+    share = 1 - SAG - 1 / STEPS_BACK
+    assert remaining == pytest.approx(share * DRAWN.now[inside][:, :2], abs=1e-4)
 
 
 def test_only_the_robot_and_only_before_it_moves_the_object() -> None:
@@ -87,6 +91,19 @@ def test_only_the_robot_and_only_before_it_moves_the_object() -> None:
     assert not DISPLACED[~free[ROWS]].any()
     assert DISPLACED[free[ROWS]].mean() == pytest.approx(0.5, abs=0.03)
     assert DRAWN.now[DISPLACED][:, :2].std(axis=0) == pytest.approx(CORRECTIONS.deviations, rel=0.1)
+
+
+def test_all_that_is_drawn_lies_in_the_widened_range() -> None:
+    both = np.concatenate([DATA.observations, DATA.next_observations])
+    low, high = CORRECTIONS.widened(both.min(axis=0), both.max(axis=0))
+    drawn = [DATA.observations[ROWS] + DRAWN.now, DATA.next_observations[ROWS] + DRAWN.following]
+    for states in drawn:
+        assert (states >= low - 1e-6).all()
+        assert (states <= high + 1e-6).all()
+    assert (drawn[0][:, :2] < both.min(axis=0)[:2]).any()  # what the range of the data would cut
+    as_seen = [2, 5, 6]  # the finger and the objects
+    assert np.array_equal(low[as_seen], both.min(axis=0)[as_seen])
+    assert np.array_equal(high[as_seen], both.max(axis=0)[as_seen])
 
 
 def test_the_accident_of_another_object_does_not_end_it() -> None:

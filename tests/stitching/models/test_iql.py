@@ -605,6 +605,7 @@ def test_a_displaced_robot_takes_its_corrected_action_to_another_next_state() ->
         deviations=np.array([0.5]),
         pose=np.array([0]),
         robot=np.array([0, 1]),
+        drift=np.array([[-0.1], [0.3]]),
         effect=np.array([[0.2, 0, 0, 0], [0, 0.1, 0, 0]]),
         back=np.array([[1.0], [0.5], [0], [0]]),
         free=np.ones(len(data), dtype=bool),
@@ -626,8 +627,8 @@ def test_a_displaced_robot_takes_its_corrected_action_to_another_next_state() ->
     )
     assert not change[away == 0].any()
     further = (displaced.next_inputs - plain.next_inputs)[:, :3].numpy() * std
-    assert further[:, 0] == pytest.approx(away + 0.2 * change[:, 0], abs=1e-5)
-    assert further[:, 1] == pytest.approx(0.1 * change[:, 1], abs=1e-5)
+    assert further[:, 0] == pytest.approx(0.9 * away + 0.2 * change[:, 0], abs=1e-5)
+    assert further[:, 1] == pytest.approx(0.3 * away + 0.1 * change[:, 1], abs=1e-5)
     assert not further[:, 2].any()
     assert torch.equal(plain.rewards, displaced.rewards)
     assert torch.equal(plain.continues, displaced.continues)
