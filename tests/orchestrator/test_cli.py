@@ -15,6 +15,7 @@ from unittest import mock
 import numpy as np
 import pytest
 
+from analysis.results import provenance_text
 from orchestrator import worker
 from orchestrator.cli import COMMANDS, main
 from orchestrator.errors import LockedError
@@ -356,6 +357,23 @@ def test_report(cli: Cli, done: Place, expected: dict[str, bytes]) -> None:
     exported = done.root / "results" / "table1"
     assert (exported / "table.md").read_bytes() == expected["report/table1.md"]
     assert str(exported) in answer.out
+
+
+def test_results_of_a_larger_run_stay(cli: Cli, place: Place, done: Place) -> None:
+    """Refused before anything runs, and where a report is exported; --force is asked for both."""
+    results = place.root / "larger"
+    (results / "table1").mkdir(parents=True)
+    kept = results / "table1" / "provenance.json"
+    kept.write_text(provenance_text({}, {"scale": "paper", "seeds": 99}))
+    before = kept.read_bytes()
+    for words in (["run", *options(place)], ["report", done.out]):
+        refused = cli(*words, "--results", results)
+        assert refused.code == 2
+        assert "--force to replace it" in refused.err
+        assert kept.read_bytes() == before
+    assert not place.out.exists()
+    assert cli("report", done.out, "--results", results, "--force").code == 0
+    assert kept.read_bytes() != before
 
 
 def test_report_of_a_run_that_has_not_played_yet(cli: Cli, spec: Spec, place: Place) -> None:

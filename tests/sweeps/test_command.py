@@ -11,6 +11,7 @@ from unittest import mock
 import pandas as pd
 import pytest
 
+from analysis.results import extent_of, provenance_text
 from orchestrator import locking
 from orchestrator.cli import main
 from orchestrator.errors import LockedError
@@ -61,6 +62,32 @@ def test_nothing_is_exported_unless_it_is_asked_for(
     place = words.index("--results")
     main([*words[:place], *words[place + 2 :]])
     assert list(Path().iterdir()) == []
+
+
+def test_results_of_a_larger_sweep_stay(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "results" / tiny_sweep().name
+    folder.mkdir(parents=True)
+    kept = provenance_text({}, {"trials": 99})
+    (folder / "provenance.json").write_text(kept)
+    with pytest.raises(SystemExit) as refused:
+        main(command(tmp_path))
+    assert refused.value.code == 2
+    assert "trials 99 against 10" in capsys.readouterr().err
+    assert (folder / "provenance.json").read_text() == kept
+    assert not (tmp_path / "sweep").exists()
+
+
+def test_an_export_says_how_much_a_sweep_is(done: Path) -> None:
+    sweep = tiny_sweep()
+    main(command(done))
+    extent = extent_of(done / "results" / sweep.name)
+    assert extent == sweep.extent
+    assert extent["trials"] == 10
+    (done / "results" / sweep.name / "provenance.json").write_text(
+        provenance_text({}, extent | {"trials": 99})
+    )
+    main(command(done, "--force"))
+    assert extent_of(done / "results" / sweep.name) == extent
 
 
 def test_a_sweep_knows_its_store_and_uses_it_beside_others(
