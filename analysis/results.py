@@ -22,24 +22,32 @@ def check_results(results: Path, names: Iterable[str], extent: Extent, force: bo
     run, so that it does not end in vain, and again when its tables are written. With `force`
     anything is replaced; so is what tells no extent.
     """
-    try:
-        existing = next(
-            path for path in (results, *results.absolute().parents) if os.path.lexists(path)
-        )
-        usable = existing.is_dir() and os.access(existing, os.W_OK | os.X_OK)
-        results.stat() if usable and existing == results else results.parent.exists()
-    except OSError as error:
-        raise RunError(f"{results}: cannot be written to ({error.strerror})") from error
-    if not usable:
+    existing = _existing(results)
+    if not existing.is_dir() or not os.access(existing, os.W_OK | os.X_OK):
         raise RunError(f"{results}: {existing} is no folder that can be written to; name another")
     for name in names:
         kept = extent_of(results / name)
-        for what in kept.keys() & extent.keys():
+        for what in sorted(kept.keys() & extent.keys()):
             if not force and _size(extent[what]) < _size(kept[what]):
                 raise RunError(
                     f"{results / name} holds more, {what} {kept[what]} against {extent[what]}: "
                     "export to another folder, or say --force to replace it"
                 )
+
+
+def _existing(path: Path) -> Path:
+    """The path itself, or the nearest folder above it that is there."""
+    for each in (path, *path.absolute().parents):
+        try:
+            each.lstat()
+        except (FileNotFoundError, NotADirectoryError):
+            continue
+        except OSError as error:
+            raise RunError(
+                f"{path}: cannot be looked at ({error.strerror}); name another"
+            ) from error
+        return each
+    raise RunError(f"{path}: nothing of it exists; name another")
 
 
 def _size(value: str | int) -> int:
@@ -56,12 +64,11 @@ def extent_of(folder: Path) -> Extent:
     """Of the results in a folder; {} where there are none, or they do not say."""
     file = folder / "provenance.json"
     try:
-        extent: Extent = json.loads(file.read_text(encoding="utf-8")).get("extent", {})
-        scale = extent.get("scale", SCALES[0])
+        extent = dict(json.loads(file.read_text(encoding="utf-8")).get("extent", {}))
     except FileNotFoundError:
         return {}
-    except (ValueError, AttributeError, OSError) as error:
+    except (ValueError, TypeError, AttributeError, OSError) as error:
         raise RunError(f"{file}: unreadable ({error}); move it away") from error
-    if scale not in SCALES or not all(isinstance(value, str | int) for value in extent.values()):
-        raise RunError(f"{file}: no scale {scale!r}; there are {', '.join(SCALES)}; move it away")
+    if not all(isinstance(value, int) or value in SCALES for value in extent.values()):
+        raise RunError(f"{file}: its extent {extent} cannot be read; move it away")
     return extent

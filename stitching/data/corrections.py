@@ -19,7 +19,7 @@ from stitching.data.transitions import DataError, Transitions
 from stitching.envs.factors import NO_OBJECT, Factors
 
 SHARE = 0.5  # of the transitions in which the robot may be displaced
-STEPS_BACK = 3  # in which an action's share of the way would bring the robot back
+STEPS_BACK = 3  # a corrected action brings the robot back by one of so many equal parts
 FARTHEST = 3  # deviations by which a number is displaced at most
 KNOWN = 0.9  # of a number's variance: what is explained by less is left as it is
 

@@ -155,7 +155,12 @@ def test_unusable_data_is_refused_before_training(
     assert caught.value.exit_code == 7
 
 
-def test_training_that_diverges(spec: Spec, place: Place) -> None:
-    diverging = replace(spec, agent=replace(spec.agent, learning_rate=1e30))
-    with pytest.raises(BadDataError, match=r"agent \w+: training diverged: \w+ is (nan|inf)"):
-        place.carry_out(diverging)
+def test_training_that_diverges(spec: Spec, plan: Plan, place: Place, finished: Place) -> None:
+    """Data that are finite, and too large to be squared."""
+    key = plan.datasets["demonstrations"]
+    real = finished.store.read("maze-demonstrations", key)
+    arrays = real.arrays | {"next_observations": real.arrays["next_observations"] + 1e37}
+    arrays["next_observations"] = arrays["next_observations"].astype(np.float32)
+    place.store.write("maze-demonstrations", key, Artifact(arrays, real.info), {"kind": "x"})
+    with pytest.raises(BadDataError, match=r"\w+ \w+: training diverged: \w+ is (nan|inf)"):
+        place.carry_out(spec)

@@ -782,7 +782,7 @@ def test_the_temperature_lies_between_the_mode_and_the_learned_policy() -> None:
 
 
 def test_a_negative_temperature_is_refused() -> None:
-    with pytest.raises(ValueError, match="temperature: must not be negative"):
+    with pytest.raises(ValueError, match="temperature: must be at least 0"):
         RolloutConfig(temperature=-0.1)
 
 

@@ -147,7 +147,8 @@ def test_without_momentum_one_elite_is_the_best_sample() -> None:
 
 
 def test_at_zero_temperature_the_best_elite_decides() -> None:
-    frozen = replace(PLANNER, temperature_discount=0.0, iterations=40).plan(bowls, streams(), SPACE)
+    falling = replace(PLANNER, temperature_discount=1e-300, iterations=40)
+    frozen = falling.plan(bowls, streams(), SPACE)
     cold = replace(PLANNER, temperature=1e-300, iterations=40).plan(bowls, streams(), SPACE)
     best = replace(PLANNER, elites=1, iterations=40).plan(bowls, streams(), SPACE)
     assert torch.equal(cold.actions, best.actions)
