@@ -56,6 +56,48 @@ def test_fine_tuning_begins_as_the_next_skill(multi_task: bool) -> None:
         assert np.array_equal(actions, models["agent"].act(STATES, following, noise=None))
 
 
+def a_robot_that_obeys() -> Transitions:
+    """Kitchen's observations of an arm whose joints do as they are told; two skills are shown."""
+    rng, steps = stream("obeys"), 30
+    actions = rng.uniform(-0.5, 0.5, size=(4, steps, 9)).astype(np.float32)
+    states = rng.normal(size=(4, 1, KITCHEN.observation_size)).repeat(steps + 1, axis=1)
+    states[:, 1:, :9] += 0.1 * actions.cumsum(axis=1)
+    for column in KITCHEN.factors.objects["kettle"].positions:
+        states[:2, -3:, column] += 1.0
+    for column in KITCHEN.factors.objects["microwave"].positions:
+        states[2:, -3:, column] += 1.0
+    states = states.astype(np.float32)
+    return Transitions(
+        observations=states[:, :-1].reshape(4 * steps, -1),
+        actions=actions.reshape(4 * steps, -1),
+        next_observations=states[:, 1:].reshape(4 * steps, -1),
+        episode_ends=steps * np.arange(1, 5),
+        episode_skills=np.array([6, 6, 5, 5]),
+        episode_successes=np.ones(4, dtype=bool),
+    )
+
+
+def test_each_way_of_altering_the_data_reaches_the_agent() -> None:
+    data = a_robot_that_obeys()
+
+    def agent(**changes: float | bool) -> dict[str, np.ndarray]:
+        config = replace(SKILLS, clip=True, **changes)
+        recipe = {"benchmark": "kitchen", "root_seed": 0, "seed": 0, "config": to_plain(config)}
+        recipe["factors"] = to_plain(KITCHEN.factors)
+        return dict(BUILDERS["agent"].make(recipe, {"demonstrations": as_artifact(data)}).arrays)
+
+    plain, swapped, corrected = agent(), agent(swap=0.8), agent(corrections=1.5)
+    both = agent(swap=0.8, corrections=1.5)
+    weights = [each["policy.w0"].tobytes() for each in (plain, swapped, corrected, both)]
+    assert len(set(weights)) == 4
+    low, wider = plain["observation_low"], corrected["observation_low"]
+    assert (wider[:9] < low[:9] - 0.05).all()
+    assert np.array_equal(wider[18:], low[18:])
+    assert np.array_equal(swapped["observation_low"], low)
+    with pytest.raises(NotImplementedError, match="do not learn from altered data"):
+        agent(corrections=1.5, multi_task=False)
+
+
 def test_initiation_sets_know_which_objects_their_skills_are_not_about() -> None:
     """Two skills of Kitchen are shown, each once, from another state; the last fails."""
     skills = np.array([0, 5, 1])
