@@ -7,7 +7,7 @@ import pandas as pd
 
 from analysis.episodes import episodes_from_segments
 from analysis.rows import place_tasks
-from analysis.run import RunError, RunSpec, load_run
+from analysis.run import RunError, RunSpec, load_run, load_run_spec
 from analysis.statistics import generator, paired_gain
 from analysis.writers import BOOTSTRAP, seed_note
 
@@ -79,7 +79,7 @@ def _root_seeds(spec: RunSpec) -> dict[str, list[object]]:
 
 def settings_apart(run_a: Path, run_b: Path) -> pd.DataFrame:
     """What was asked differently of two runs: field, a, b. Missing where one has no such field."""
-    a, b = (load_run(run).spec.settings for run in (run_a, run_b))
+    a, b = (load_run_spec(run).settings for run in (run_a, run_b))
     paths = sorted(path for path in a.keys() | b.keys() if a.get(path) != b.get(path))
     rows = [(path, a.get(path, "–"), b.get(path, "–")) for path in paths]
     return pd.DataFrame(rows, columns=["field", "a", "b"])

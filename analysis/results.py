@@ -37,17 +37,13 @@ def check_results(results: Path, names: Iterable[str], extent: Extent, force: bo
 
 def _existing(path: Path) -> Path:
     """The path itself, or the nearest folder above it that is there."""
-    for each in (path, *path.absolute().parents):
-        try:
-            each.lstat()
-        except (FileNotFoundError, NotADirectoryError):
-            continue
-        except OSError as error:
-            raise RunError(
-                f"{path}: cannot be looked at ({error.strerror}); name another"
-            ) from error
-        return each
-    raise RunError(f"{path}: nothing of it exists; name another")
+    try:
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return _existing(path.absolute().parent)
+    except OSError as error:
+        raise RunError(f"{path}: cannot be looked at ({error.strerror}); name another") from error
+    return path
 
 
 def _size(value: str | int) -> int:

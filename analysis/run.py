@@ -6,7 +6,7 @@ The orchestrator writes these files; this module is the only place that knows th
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -92,7 +92,7 @@ class RunSpec:
                 ),
                 block_episodes=spec.get("spec", {}).get("block_episodes", 1),
                 long_task=spec.get("spec", {}).get("single_policy", {}).get("task", ""),
-                settings=dict(_leaves(spec.get("spec", {}))),
+                settings=_settings(spec.get("spec", {})),
                 parts=tuple(
                     PartEntry(
                         part["label"],
@@ -146,16 +146,26 @@ class RunSpec:
         return " → ".join(self.skill_label(skill) for skill in task.split(SEPARATOR))
 
 
-def _leaves(plain: object, path: str = "") -> Iterator[tuple[str, object]]:
-    """{"cem": {"horizon": 3}} → ("cem.horizon", 3); parts go by their labels."""
-    if isinstance(plain, dict) and plain:
-        for name, value in plain.items():
-            yield from _leaves(value, f"{path}.{name}" if path else name)
-    elif isinstance(plain, list) and plain and all(isinstance(part, dict) for part in plain):
-        for number, part in enumerate(plain):
-            yield from _leaves(part, f"{path}.{part.get('label', part.get('id', number))}")
-    else:
-        yield path, plain
+def leaves(plain: Mapping[str, Any], separator: str) -> dict[str, Any]:
+    """Nested dicts as one, their keys joined."""
+    flat: dict[str, Any] = {}
+    for name, value in plain.items():
+        if isinstance(value, dict):
+            below = leaves(value, separator).items()
+            flat |= {f"{name}{separator}{key}": leaf for key, leaf in below}
+        else:
+            flat[name] = value
+    return flat
+
+
+def _settings(asked: Mapping[str, Any]) -> dict[str, Any]:
+    """All that was asked, by path; parts by their labels, and tables by their ids."""
+    named = {
+        name: {part[key]: part for part in asked[name]}
+        for name, key in (("parts", "label"), ("tables", "id"))
+        if name in asked
+    }
+    return leaves({**asked, **named}, ".")
 
 
 def _step_limits(plain: Mapping[str, Any]) -> dict[int, int]:
@@ -195,6 +205,11 @@ class Run:
         return self.diagnoses.get("", {})
 
 
+def load_run_spec(run_dir: Path) -> RunSpec:
+    """What was asked of a run, without what it played."""
+    return RunSpec.from_dict(_read_json(run_dir / "spec.json", {}))
+
+
 def load_run(run_dir: Path) -> Run:
     """Reads a run directory, or says what it lacks."""
     import pandas as pd  # the words above are used where pandas need not be paid for
@@ -207,7 +222,7 @@ def load_run(run_dir: Path) -> Run:
                 "at least one block"
             )
     return Run(
-        spec=RunSpec.from_dict(_read_json(run_dir / "spec.json", {})),
+        spec=load_run_spec(run_dir),
         segments=pd.read_parquet(segments),
         provenance=_read_json(run_dir / "provenance.json", {}),
         quarantine=_read_json(run_dir / "quarantine.json", []),

@@ -39,15 +39,10 @@ NO_TRACKING = "none"
 MOST_ON_A_CORE = 8  # workers: each holds a copy of torch and of a simulator
 
 
-def check_workers(workers: int | None, most: int | None = None) -> None:
-    """Raise UsageError where so many cannot be started here."""
+def check_workers(workers: int | None) -> None:
+    """Raise UsageError for a number that nothing could have."""
     if workers is not None and workers < 1:
         raise UsageError(f"--workers must be at least 1: {workers}")
-    if workers is not None and most is not None and workers > most:
-        raise UsageError(
-            f"--workers {workers}: at most {most} on this machine's {usable_cores()} cores; for "
-            "more, give the --address of a Ray cluster"
-        )
 
 
 @dataclass(frozen=True)
@@ -62,10 +57,15 @@ class Settings:
     tracking_uri: str | None = None  # SQLite beside the store; "none" turns tracking off
 
     def __post_init__(self) -> None:
-        if self.address is None:
-            check_workers(self.workers, MOST_ON_A_CORE * usable_cores())
-        else:
-            check_workers(self.workers)
+        check_workers(self.workers)
+        if self.workers is None or self.address is not None:
+            return
+        cores = usable_cores()
+        if self.workers > MOST_ON_A_CORE * cores:
+            raise UsageError(
+                f"--workers {self.workers}: at most {MOST_ON_A_CORE * cores} on this machine's "
+                f"{cores} cores; for more, give the --address of a Ray cluster"
+            )
 
     def resolved_tracking_uri(self) -> str:
         return self.tracking_uri or tracking.default_uri(self.store.parent)

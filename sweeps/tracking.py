@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 
+from analysis.run import leaves
 from orchestrator.progress import Progress
 from orchestrator.reproduce import NO_TRACKING
 from orchestrator.rundir import RunDirectory
 from orchestrator.structure import Plain
 from orchestrator.tracking.metrics import finite
-from orchestrator.tracking.names import allowed_name, leaves, short_text
+from orchestrator.tracking.names import allowed_name, short_text
 from orchestrator.tracking.receipt import Status
 from orchestrator.tracking.stores import connect, open_experiment, turn_to_write
 from orchestrator.tracking.views import RunView

@@ -4,23 +4,10 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
 from typing import Any
 
 LONGEST_TEXT = 500  # of a param or tag: what every MLflow version takes
 LONGEST_KEY = 250
-
-
-def leaves(plain: Mapping[str, Any], separator: str) -> dict[str, Any]:
-    """Nested dicts as one, their keys joined."""
-    flat: dict[str, Any] = {}
-    for name, value in plain.items():
-        if isinstance(value, dict):
-            below = leaves(value, separator).items()
-            flat |= {f"{name}{separator}{key}": leaf for key, leaf in below}
-        else:
-            flat[name] = value
-    return flat
 
 
 def allowed_name(text: str) -> str:

@@ -10,14 +10,13 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from analysis.run import RunSpec, leaves
 from orchestrator.tracking.metrics import Curves, finite, learning_curves, reported, seed_scores
-from orchestrator.tracking.names import allowed_name, leaves, short_text
+from orchestrator.tracking.names import allowed_name, short_text
 from orchestrator.tracking.receipt import Status, digest, published_files
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from analysis.run import RunSpec
 
 RUN_ID, METHOD, SEED = IDENTITY = ("skillstitch.run_id", "skillstitch.method", "skillstitch.seed")
 SPENT = ("seconds", "busy worker seconds", "counts")  # parts of the provenance that are numbers
@@ -47,8 +46,6 @@ class RunView:
 
 def read_views(run_dir: Path, status: Status) -> list[RunView]:
     """The parent's view, then one for each (method, seed) that there is something to show of."""
-    from analysis.run import RunSpec
-
     plain = json.loads((run_dir / "spec.json").read_text())
     provenance = json.loads((run_dir / "provenance.json").read_text())
     training = _read_json(run_dir / "training.json", [])

@@ -73,10 +73,10 @@ class Corrections:
         causes = np.concatenate([states, data.actions[free], np.ones((len(states), 1))], axis=1)
         solution, *_ = np.linalg.lstsq(causes, changes, rcond=None)
         errors = changes - causes @ solution
-        known = errors.var(axis=0) <= (1 - KNOWN) * changes.var(axis=0)
+        known = errors.var(axis=0) < (1 - KNOWN) * changes.var(axis=0)
         drift = solution[: len(robot)].T  # (robot, robot)
         effect = solution[len(robot) : -1].T  # (robot, action)
-        displaced = known & np.isin(robot, factors.pose) & (changes.var(axis=0) > 0)
+        displaced = known & np.isin(robot, factors.pose)
         if not displaced.any():
             raise DataError("corrections: the data do not tell how actions move the robot")
         return cls(

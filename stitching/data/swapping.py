@@ -28,7 +28,8 @@ def bystanders(data: Transitions, factors: Factors, skills: Sequence[str]) -> np
 
     An object stands still where its move is less than a tenth of the usual one.
     """
-    still: np.ndarray = _moves(data, factors) < STILL * usual_moves(data, factors, skills)
+    moves = _moves(data, factors)
+    still: np.ndarray = moves < STILL * _usual(moves, demonstrations_about(data, factors, skills))
     for episode, skill in enumerate(data.episode_skills.tolist()):
         if skill < 0:
             still[episode] = False
@@ -46,7 +47,11 @@ def usual_moves(data: Transitions, factors: Factors, skills: Sequence[str]) -> n
     tenth of its deviation over the data would be less than the noise for an object that is moved
     in few states.)
     """
-    moves, about = _moves(data, factors), demonstrations_about(data, factors, skills)
+    return _usual(_moves(data, factors), demonstrations_about(data, factors, skills))
+
+
+def _usual(moves: np.ndarray, about: np.ndarray) -> np.ndarray:
+    """From moves and whether they are meant, both (E, objects): (objects,)."""
     usual = [
         np.median(own[shown]) if shown.any() else own.max()
         for own, shown in zip(moves.T, about.T, strict=True)

@@ -12,14 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from stitching.bounds import (
-    Amount,
-    Bounded,
-    Count,
-    Episodes,
-    NotNegative,
-    Share,
-)
+from stitching.bounds import Amount, Bounded, Count, Episodes, NotNegative, Share
 from stitching.data.kitchen.arm import GRIP_OPEN, HOME, Arm
 from stitching.data.kitchen.programs import PROGRAMS, Program, Style, perform, relocate, style
 from stitching.data.kitchen.segments import Episode, Order, Segment, as_transitions, cut
