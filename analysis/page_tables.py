@@ -4,7 +4,15 @@ import math
 from html import escape
 
 from analysis.tables import Table
-from analysis.verdicts import HOLDS, NO_DATA, NOT_PRINTED, ONE_SEED, cell_verdicts, claims
+from analysis.verdicts import (
+    HOLDS,
+    NO_DATA,
+    NOT_JUDGED,
+    NOT_PRINTED,
+    ONE_SEED,
+    cell_verdicts,
+    claims,
+)
 from analysis.writers import Record, gain_texts, paper_text, short_of
 
 
@@ -30,7 +38,7 @@ def table_of(header: list[str], rows: list[list[str]], attributes: str = "") -> 
 
 def scores_html(table: Table) -> str:
     """Each cell: our score, its interval, the paper's, and the verdict."""
-    verdicts = cell_verdicts(table.scores)
+    verdicts = cell_verdicts(table)
     cells = {
         (cell["row"], cell["method"]): _score_cell(table, cell, verdict)
         for cell, verdict in zip(table.scores.to_dict("records"), verdicts, strict=True)
@@ -61,6 +69,7 @@ def _score_cell(table: Table, cell: Record, verdict: str) -> str:
         )
     if verdict != NOT_PRINTED:
         html += f'<span class="aside">paper {paper_text(cell)}</span>'
+    if verdict not in (NOT_PRINTED, NOT_JUDGED):
         html += f'<span class="verdict {verdict.replace(" ", "-")}">{verdict}</span>'
     short = short_of(table, cell["row"], cell["method"])
     return html + (f'<span class="partial-cell">{short}</span>' if short else "")

@@ -20,8 +20,9 @@ def _read() -> pd.DataFrame:
 
 
 def paper_table(number: str) -> pd.DataFrame:
-    """Columns row, method, score, error, note of one table of the paper; empty if it has none.
+    """Columns row, tasks, method, score, error, note of a table of the paper; empty if it has none.
 
+    `tasks` is over how many tasks a row's scores are means: all permutations of that length.
     `error` is the number after the paper's ±, which it calls the variance over three seeds.
     """
     cells = _read()
@@ -34,6 +35,12 @@ def paper_scores(number: str) -> dict[tuple[str, str], tuple[float, float]]:
     keys = zip(cells["row"], cells["method"], strict=True)
     numbers = zip(cells["score"], cells["error"], strict=True)
     return {key: cell for key, cell in zip(keys, numbers, strict=True) if key[1] != NET_GAIN}
+
+
+def paper_tasks(number: str) -> dict[str, int]:
+    """Row -> the tasks that its scores in the paper are means over."""
+    cells = paper_table(number)
+    return dict(zip(cells["row"], cells["tasks"].astype(int), strict=True))
 
 
 def net_gain_check() -> pd.DataFrame:

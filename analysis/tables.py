@@ -1,13 +1,14 @@
 """A table of a run: every cell's score, and the gains of one method over another."""
 
 from collections import Counter
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
 from analysis.orders import Cells, by_order, order_duels
-from analysis.paper import paper_scores
+from analysis.paper import paper_scores, paper_tasks
 from analysis.rows import column_labels, place_tasks
 from analysis.run import RunSpec, TableEntry
 from analysis.statistics import arrange, estimate, generator, paired_gain
@@ -33,6 +34,7 @@ class Table:
     orders: pd.DataFrame  # GAIN_COLUMNS: Table 4's leaders by order of skills, no line elsewhere
     expected: dict[tuple[str, str], int]  # (row, method) -> episodes of a complete cell
     labels: dict[str, str]  # method -> how the table's head calls it
+    other_tasks: dict[str, tuple[int, int]]  # row -> tasks here and in the paper, where they differ
 
     @property
     def rows(self) -> list[str]:
@@ -61,8 +63,9 @@ def build_table(episodes: pd.DataFrame, spec: RunSpec, entry: TableEntry) -> Tab
     places = place_tasks(spec, entry)
     cells = _cells(episodes, places)
     orders, long_task = by_order(cells), spec.task_label(spec.long_task)
-    scores = score_table(cells, entry)
     tasks_of_cell = Counter(zip(places["row"], places["column"], strict=True))
+    other_tasks = _other_tasks(tasks_of_cell, entry)
+    scores = score_table(cells, entry, other_tasks)
     labels = column_labels(spec)
     gain_pairs, lead_pairs = _gain_pairs(cells, entry), _lead_pairs(scores)
     # Most leads are gains as well: each is worked out once.
@@ -78,6 +81,7 @@ def build_table(episodes: pd.DataFrame, spec: RunSpec, entry: TableEntry) -> Tab
             cell: tasks * len(spec.seeds) * spec.episodes for cell, tasks in tasks_of_cell.items()
         },
         labels={method: labels.get(method, method) for method in scores["method"].unique()},
+        other_tasks=other_tasks,
     )
 
 
@@ -91,9 +95,25 @@ def _cells(episodes: pd.DataFrame, places: pd.DataFrame) -> Cells:
     return {cell: pd.concat(played) for cell, played in parts.items()}
 
 
-def score_table(cells: Cells, entry: TableEntry) -> pd.DataFrame:
-    """SCORE_COLUMNS: each cell's estimate beside the paper's number, NaN where it has none."""
-    paper = paper_scores(entry.paper)
+def _other_tasks(
+    tasks_of_cell: Mapping[tuple[str, str], int], entry: TableEntry
+) -> dict[str, tuple[int, int]]:
+    """Rows that are means over other tasks than the paper's: how many here, how many there."""
+    printed = paper_tasks(entry.paper)
+    return {
+        row: (tasks, printed[row])
+        for (row, _), tasks in tasks_of_cell.items()
+        if row in printed and tasks != printed[row]
+    }
+
+
+def score_table(cells: Cells, entry: TableEntry, alone: Container[str] = ()) -> pd.DataFrame:
+    """SCORE_COLUMNS: each cell's estimate beside the paper's number.
+
+    NaN where the paper has none, and in the rows of `alone`.
+    """
+    paper = {cell: numbers for cell, numbers in paper_scores(entry.paper).items()
+             if cell[0] not in alone}  # fmt: skip
     records = []
     for (row, method), played in cells.items():
         ours = estimate(arrange(played, "score"), generator("score", entry.id, row, method))

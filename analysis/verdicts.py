@@ -20,6 +20,8 @@ SAME_ERROR = 0.001
 """A printed ± matches ours up to one unit of its last digit."""
 
 AGREES, HIGHER, LOWER, NO_DATA, NOT_PRINTED = "agrees", "higher", "lower", "no data", "not in paper"
+JUDGEMENTS = (AGREES, HIGHER, LOWER)
+NOT_JUDGED = "not judged"
 HOLDS, UNDECIDED, FAILS = "holds", "undecided", "fails"
 
 EXPLANATION = (
@@ -29,6 +31,11 @@ EXPLANATION = (
     f"“{UNDECIDED}” if the interval contains zero. Only the claim of a constant number of "
     f"accomplished skills is judged without an interval: it “{HOLDS}” if our numbers lie within "
     f"{SAME_SKILLS} of each other at all lengths, and else “{FAILS}”."
+)
+SMOKE = "smoke"
+SMOKE_EXPLANATION = (
+    "The smoke scale shows that everything runs. Its models are hardly trained and its episodes "
+    "few, so it is not judged by the paper's numbers."
 )
 ONE_SEED = "for these models"
 ONE_SEED_EXPLANATION = (
@@ -55,6 +62,8 @@ class Claim:
 
 def explanation(table: Table) -> str:
     """How the table's verdicts are to be read."""
+    if table.spec.scale == SMOKE:
+        return SMOKE_EXPLANATION
     return " ".join([EXPLANATION, *([ONE_SEED_EXPLANATION] if table.fewest_seeds == 1 else [])])
 
 
@@ -70,14 +79,19 @@ def cell_verdict(score: float, low: float, high: float, paper_score: float) -> s
     return HIGHER if score > paper_score else LOWER
 
 
-def cell_verdicts(scores: pd.DataFrame) -> list[str]:
-    """One verdict for each row of a score table."""
-    columns = scores[["score", "ci_low", "ci_high", "paper_score"]].to_numpy(dtype=float)
-    return [cell_verdict(*cell) for cell in columns]
+def cell_verdicts(table: Table) -> list[str]:
+    """One verdict for each line of the table's scores."""
+    columns = table.scores[["score", "ci_low", "ci_high", "paper_score"]].to_numpy(dtype=float)
+    verdicts = [cell_verdict(*cell) for cell in columns]
+    if table.spec.scale == SMOKE:
+        return [NOT_JUDGED if verdict in JUDGEMENTS else verdict for verdict in verdicts]
+    return verdicts
 
 
 def claims(table: Table) -> list[Claim]:
-    """All claims of the paper's table that the run can speak to."""
+    """All claims of the paper's table that the run can speak to: none at smoke scale."""
+    if table.spec.scale == SMOKE:
+        return []
     return [*_orders(table), *_leads(table), *_constant_skills(table)]
 
 
@@ -141,7 +155,7 @@ def _constant_skills(table: Table) -> list[Claim]:
     rounding = 2 * HALF_DIGIT * max(int(row.split()[0]) for row in printed.index)
     if np.ptp(printed) > rounding:
         return []
-    cells = table.scores.query("method == @method").set_index("row")
+    cells = table.scores.query("method == @method").dropna(subset="paper_score").set_index("row")
     ours = cells["score"] * [int(row.split()[0]) for row in cells.index]
     text = f"{table.labels[method]} accomplishes the same number of skills at every length"
     if ours.isna().any() or len(ours) < 2:

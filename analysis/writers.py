@@ -9,6 +9,7 @@ import pandas as pd
 from analysis.tables import Table
 from analysis.verdicts import (
     NO_DATA,
+    NOT_JUDGED,
     NOT_PRINTED,
     cell_verdicts,
     claims,
@@ -45,6 +46,15 @@ def describe(table: Table) -> list[str]:
     ]
     if table.fewest_seeds < len(spec.seeds):
         lines[-1] += f" That is so for some cells here: not all have {seeds}."
+    if table.other_tasks:
+        rows = (
+            f"{row} ({here} here, {paper} there)"
+            for row, (here, paper) in table.other_tasks.items()
+        )
+        lines.append(
+            "Not beside the paper's numbers, which are means over another number of tasks: "
+            f"{', '.join(rows)}."
+        )
     if table.missing:
         asked, missing = sum(table.expected.values()), sum(table.missing.values())
         lines.insert(
@@ -115,12 +125,12 @@ def to_markdown(table: Table) -> str:
 
 
 def _markdown_scores(table: Table) -> str:
-    verdicts = cell_verdicts(table.scores)
+    verdicts = cell_verdicts(table)
     texts = {}
     for verdict, cell in zip(verdicts, table.scores.to_dict("records"), strict=True):
         lines = [cell_text(cell)]
         if verdict != NOT_PRINTED:
-            judged = "" if verdict == NO_DATA else f" · {verdict}"
+            judged = "" if verdict in (NO_DATA, NOT_JUDGED) else f" · {verdict}"
             lines.append(f"paper {paper_text(cell)}{judged}")
         lines.append(short_of(table, cell["row"], cell["method"]))
         texts[cell["row"], cell["method"]] = "<br>".join(filter(None, lines))

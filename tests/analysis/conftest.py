@@ -45,7 +45,7 @@ def make_spec(
         "name": "table1",
         "title": "MazeRunner: all permutations of goals",
         "benchmark": "maze",
-        "scale": "smoke",
+        "scale": "quick",
         "skills": SKILLS,
         "methods": [{"name": name, "label": label} for name, label in LABELS.items()],
         "seeds": list(range(seeds)),

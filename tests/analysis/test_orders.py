@@ -27,7 +27,7 @@ def spec_of(long_task: str) -> RunSpec:
         {
             "name": "table4",
             "benchmark": "kitchen",
-            "scale": "smoke",
+            "scale": "quick",
             "skills": ["bottom burner", "light switch", "microwave", "kettle"],
             "methods": [
                 {"name": "single-policy", "label": "Single-Policy"},

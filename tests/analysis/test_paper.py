@@ -1,3 +1,5 @@
+from math import perm
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -22,6 +24,14 @@ def test_every_cell_is_transcribed_once(number: str, cells: int) -> None:
     scores = table[table["method"] != NET_GAIN]
     assert scores["score"].between(0, 1).all()
     assert scores["error"].between(0, 0.05).all()
+
+
+@pytest.mark.parametrize(("number", "skills"), [("1", 4), ("2", 7), ("8", 7)])
+def test_rows_of_all_permutations_say_how_many_there_are(number: str, skills: int) -> None:
+    table = paper_table(number).drop_duplicates("row")
+    lengths = [row.count("→") + 1 if "→" in row else int(row.split()[0]) for row in table["row"]]
+    every = table["tasks"].groupby(lengths).sum()
+    assert every.to_dict() == {n: perm(skills, n) for n in sorted(set(lengths))}
 
 
 def test_a_table_the_paper_does_not_have_is_empty() -> None:

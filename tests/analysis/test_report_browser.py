@@ -68,7 +68,7 @@ def test_shows_the_table_beside_the_paper(page: Any) -> None:
     cell = page.locator("#table1 table.scores tbody tr").first.locator("td").last
     assert "paper 0.986 ± 0.000" in cell.inner_text()
     assert "agrees" in cell.inner_text()
-    assert page.get_by_text("scale: smoke", exact=True).is_visible()
+    assert page.get_by_text("scale: quick", exact=True).is_visible()
     assert page.get_by_text("3 seeds", exact=True).is_visible()
 
 

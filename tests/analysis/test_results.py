@@ -73,7 +73,7 @@ def test_an_export_says_its_extent_and_keeps_to_it(tmp_path: Path, write_run: An
     run_dir = write_run(tmp_path / "run", training=None, showcase=None)
     (folder,) = export_results(run_dir, tmp_path / "results")
     extent = extent_of(folder)
-    assert extent == {"scale": "smoke", "seeds": 3, "episodes": 10, "tasks": 60}
+    assert extent == {"scale": "quick", "seeds": 3, "episodes": 10, "tasks": 60}
     (folder / "provenance.json").write_text(provenance_text({}, extent | {"seeds": 4}))
     before = {path: path.read_bytes() for path in folder.iterdir() if path.is_file()}
     with pytest.raises(RunError, match="seeds 4 against 3"):

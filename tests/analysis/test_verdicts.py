@@ -16,11 +16,15 @@ from analysis.verdicts import (
     HOLDS,
     LOWER,
     NO_DATA,
+    NOT_JUDGED,
     NOT_PRINTED,
     ONE_SEED_EXPLANATION,
     SAME_SKILLS,
+    SMOKE,
+    SMOKE_EXPLANATION,
     UNDECIDED,
     cell_verdict,
+    cell_verdicts,
     claims,
     error_reading,
     explanation,
@@ -78,6 +82,25 @@ def test_a_verdict_from_one_seed_is_of_its_models_alone(segments: Any, spec: Run
 def test_a_verdict_from_several_seeds_is_said_as_it_is(table: Table) -> None:
     assert [claim.judgement for claim in claims(table)] == [HOLDS] * 4
     assert explanation(table) == EXPLANATION
+
+
+def test_a_smoke_run_is_not_judged(table: Table) -> None:
+    smoke = replace(table, spec=replace(table.spec, scale=SMOKE))
+    assert set(cell_verdicts(smoke)) == {NOT_JUDGED}
+    assert claims(smoke) == []
+    assert explanation(smoke) == SMOKE_EXPLANATION
+
+
+def test_rows_of_other_tasks_make_no_claim(segments: Any, spec: RunSpec) -> None:
+    """One task of twelve is not the paper's "2 goals"; the other rows are as they were."""
+    few = replace(spec, tasks=tuple(t for t in spec.tasks if t.count(">") != 1 or t == "g0>g1"))
+    table = build_table(episodes_from_segments(segments, few), few, few.tables[0])
+    verdicts = dict(zip(table.scores["row"], cell_verdicts(table), strict=True))
+    assert verdicts["2 goals"] == NOT_PRINTED
+    assert verdicts["3 goals"] in (AGREES, HIGHER, LOWER)
+    texts = [claim.text for claim in claims(table)]
+    assert not any("2 goals" in text for text in texts)
+    assert any("3 goals" in text for text in texts)
 
 
 def test_constant_skills_fail_when_they_grow(table: Table) -> None:

@@ -31,7 +31,7 @@ def test_markdown_puts_the_paper_beside_ours(table: Table) -> None:
     text = to_markdown(table)
     assert "| Task | No-Stitch | Random-Stitch | MF-Stitch | MB-Stitch |" in text
     assert "paper 0.986 ± 0.000 · agrees" in text
-    assert "Scale: smoke. 3 seeds (0, 1, 2), 10 episodes" in text
+    assert "Scale: quick. 3 seeds (0, 1, 2), 10 episodes" in text
     assert "Partial" not in text
     widths = {line.count(" | ") for line in text.splitlines() if line.startswith("| 2 goals | 0")}
     assert widths == {4}
@@ -41,6 +41,22 @@ def test_a_partial_table_says_so_with_exact_counts(partial: Table) -> None:
     assert describe(partial)[0].startswith("Partial table: 7,056 of 7,200 episodes are there")
     assert "n = 576 of 720" in to_markdown(partial)
     assert "n = 576 of 720" in to_latex(partial)
+
+
+def test_rows_of_other_tasks_stand_alone(episodes: pd.DataFrame, spec: RunSpec) -> None:
+    few = replace(spec, tasks=("g0>g1",))
+    table = build_table(episodes, few, spec.tables[0])
+    assert table.other_tasks == {"2 goals": (1, 12)}
+    text = to_markdown(table)
+    assert "2 goals (1 here, 12 there)" in text
+    assert "paper 0.986" not in text
+
+
+def test_a_smoke_run_shows_the_papers_numbers_without_a_verdict(table: Table) -> None:
+    text = to_markdown(replace(table, spec=replace(table.spec, scale="smoke")))
+    assert "paper 0.986 ± 0.000 |" in text
+    assert "agrees" not in text
+    assert "claims" not in text
 
 
 def test_csv_reads_back(table: Table) -> None:
