@@ -72,7 +72,7 @@ class Builds:
         while not set(missing) <= available:
             for key, recipe in missing.items():
                 if key not in submitted and set(recipe.inputs.values()) <= available:
-                    self.executor.submit(BuildJob(recipe))
+                    self.executor.submit(BuildJob(recipe, self.store.checkpoints(key)))
                     submitted.add(key)
             report = self.executor.next()
             assert isinstance(report.job, BuildJob)
@@ -101,6 +101,7 @@ class Builds:
                 "seconds": round(report.seconds, 3),
             }
             digest = self.store.write(recipe.kind, recipe.key, report.artifact, made)
+            self.store.drop_checkpoints(recipe.key)
             _check_artifact(self.ledger, recipe, digest)
             self.executor.provide(recipe.key, report.artifact)
             return True

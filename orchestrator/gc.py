@@ -49,7 +49,7 @@ def _collect(store: Store, needed: set[str], *, delete: bool) -> Iterator[str]:
             if delete:
                 shutil.rmtree(folder)
             yield f"{verb} {folder}"
-    for leftovers in (store.root / "incoming", store.root / "corrupt"):
+    for leftovers in (store.root / name for name in ("incoming", "corrupt", "checkpoints")):
         for folder in sorted(leftovers.glob("*")):
             if time.time() - folder.stat().st_mtime < SECONDS_TO_WRITE:
                 continue  # somebody may be writing it

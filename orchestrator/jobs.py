@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 from orchestrator.ledger import Outcome
@@ -18,6 +19,7 @@ class BuildJob:
     """Make one artifact; its inputs have been provided to the executor before."""
 
     recipe: Recipe
+    checkpoints: Path | None = None  # where its trainings may leave checkpoints
 
     @property
     def name(self) -> str:

@@ -141,6 +141,17 @@ class Store:
                 self.path(kind, key).rename(aside)
         return aside
 
+    def checkpoints(self, key: str) -> Path:
+        """Where trainings of an artifact may leave checkpoints: only who sees this store does."""
+        around = self.root.resolve() / "checkpoints"
+        with storage_errors(self.root):
+            around.mkdir(parents=True, exist_ok=True)
+        return around / key
+
+    def drop_checkpoints(self, key: str) -> None:
+        """Once the artifact is there they are of no use."""
+        shutil.rmtree(self.checkpoints(key), ignore_errors=True)
+
     def artifacts(self) -> Iterator[tuple[str, str]]:
         """All complete artifacts."""
         for manifest in sorted(self.root.glob("*/*/manifest.json")):

@@ -21,6 +21,7 @@ from orchestrator.structure import structure
 from stitching.data.transitions import DataError
 from stitching.envs.protocol import EpisodeBlock
 from stitching.envs.registry import BENCHMARKS
+from stitching.models.checkpoints import checkpoints_in
 from stitching.rollout import Play, RolloutConfig, begin, play_segment
 
 
@@ -33,7 +34,8 @@ def build(job: BuildJob, inputs: Inputs) -> Report:
     """Make an artifact; inputs by role. Trouble is reported, not raised."""
     started = time.perf_counter()
     try:
-        artifact = BUILDERS[job.recipe.kind].make(job.recipe.params, inputs)
+        with checkpoints_in(job.checkpoints):
+            artifact = BUILDERS[job.recipe.kind].make(job.recipe.params, inputs)
     except (DataError, FloatingPointError) as error:
         return Report(job, trouble="bad data", error=str(error))
     except Exception:

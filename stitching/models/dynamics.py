@@ -21,7 +21,7 @@ from stitching.models.layers import (
     prefixed,
 )
 from stitching.models.scale import observation_scale
-from stitching.models.training import CurveLog, Trained, cosine
+from stitching.models.training import CurveLog, Trained, Training, cosine
 from stitching.streams import stream
 
 
@@ -105,7 +105,8 @@ def train_dynamics(data: Transitions, config: DynamicsConfig, *labels: str | int
     optimizer = torch.optim.Adam(params.values(), lr=config.learning_rate, fused=True)
     batches = stream("batches", *labels)
     log = CurveLog(config.updates, config.log_every)
-    for update in range(config.updates):
+    training = Training(labels, params, optimizer, batches, log)
+    for update in training.updates():
         if config.learning_rate_decay:
             rate = config.learning_rate * cosine(update, config.updates)
             optimizer.param_groups[0]["lr"] = rate

@@ -34,9 +34,24 @@ from stitching.data.corrections import Corrections
 from stitching.data.experience import Experience
 from stitching.data.swapping import Swapping
 from stitching.envs.protocol import ActionSpace
-from stitching.models.layers import Params, Precision, at_precision, init_mlp, mlp, prefixed
+from stitching.models.layers import (
+    Params,
+    Precision,
+    at_precision,
+    init_mlp,
+    mlp,
+    prefixed,
+    prefixed_tensors,
+)
 from stitching.models.scale import observation_range, observation_scale
-from stitching.models.training import CurveLog, Curves, Trained, cosine
+from stitching.models.training import (
+    DRAWN_AT_ONCE,
+    CurveLog,
+    Curves,
+    Trained,
+    Training,
+    cosine,
+)
 from stitching.streams import stream
 
 LOG_STD_RANGE = (-5.0, 2.0)
@@ -193,7 +208,9 @@ def train_iql(
     log = CurveLog(config.updates, config.log_every)
     rng = stream("batches", *labels)
     batches = minibatches(experience, mean, std, config.batch_size, rng, swapping, corrections)
-    for update in range(config.updates):
+    changing = prefixed_tensors(q=q, q_target=q_target, v=v, policy=policy | {"log_std": log_std})
+    training = Training(labels, changing, optimizer, rng, log, dropout=generator)
+    for update in training.updates():
         if config.learning_rate_decay:
             rate = config.learning_rate * cosine(update, config.updates)
             optimizer.param_groups[1]["lr"] = rate
@@ -264,7 +281,7 @@ def minibatches(
     continues = torch.from_numpy((~experience.terminals).astype(np.float32))
     columns = torch.arange(observations.shape[1])
     while True:
-        for index in torch.from_numpy(rng.integers(len(rows), size=(256, batch_size))):
+        for index in torch.from_numpy(rng.integers(len(rows), size=(DRAWN_AT_ONCE, batch_size))):
             row, condition = rows[index], conditions[condition_ids[index]]
             now, following, action = observations[row], next_observations[row], actions[row]
             if swapping is not None:

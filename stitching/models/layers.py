@@ -93,6 +93,13 @@ def prefixed(params: Params, prefix: str) -> dict[str, np.ndarray]:
     return {f"{prefix}.{name}": tensor.detach().numpy() for name, tensor in params.items()}
 
 
+def prefixed_tensors(**groups: Params) -> Params:
+    """Several networks' parameters in one dictionary, as "prefix.name"."""
+    return {
+        f"{prefix}.{name}": w for prefix, params in groups.items() for name, w in params.items()
+    }
+
+
 def named(weights: Mapping[str, np.ndarray], prefix: str) -> dict[str, np.ndarray]:
     """The arrays whose names begin with "prefix.", without it."""
     return {

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,11 +12,13 @@ from orchestrator import reproduce as reproducing
 from orchestrator.building import Builds
 from orchestrator.errors import BadDataError, ChangedError, IncompleteError
 from orchestrator.executors.serial import SerialExecutor
-from orchestrator.jobs import ATTEMPTS, BuildJob, Report
+from orchestrator.jobs import ATTEMPTS, BuildJob, Job, Report
 from orchestrator.plan import Plan
 from orchestrator.progress import Silent
 from orchestrator.spec import Spec
 from orchestrator.store import Artifact
+from stitching.models import training
+from stitching.models.checkpoints import Checkpoint
 from tests.orchestrator.tiny import Counted, Lines, Place, promised_bytes
 
 
@@ -47,6 +50,38 @@ def test_a_worker_lost_while_training(
         kind = plan.recipes[key].kind
         assert place.store.read(kind, key).digest == finished.store.read(kind, key).digest
     assert "building agent again: the worker died" in lines.text
+    assert list((place.store.root / "checkpoints").iterdir()) == [], "of no use any more"
+
+
+class Checkpointed(SerialExecutor):
+    """Remembers where trainings were told to leave checkpoints."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.places: dict[str, Path | None] = {}
+
+    def submit(self, job: Job) -> None:
+        if isinstance(job, BuildJob):
+            self.places[job.recipe.key] = job.checkpoints
+        super().submit(job)
+
+
+def test_trainings_leave_checkpoints_beside_the_store_while_they_last(
+    plan: Plan, place: Place, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every one its own, and none remains when the artifact is there."""
+    monkeypatch.setattr(training, "SECONDS_BETWEEN_CHECKPOINTS", 0.0)
+    monkeypatch.setattr(training, "DRAWN_AT_ONCE", 1)
+    kept: list[Path] = []
+    monkeypatch.setattr(Checkpoint, "write", lambda checkpoint, *_: kept.append(checkpoint.path))
+    place.out.mkdir()
+    executor = Checkpointed()
+    Builds(plan, place.store, place.directory.ledger(), executor, Silent()).run(plan.needed, set())
+    around = place.store.root.resolve() / "checkpoints"
+    assert executor.places == {key: around / key for key in plan.needed}
+    trained = {key for key in plan.needed if plan.recipes[key].kind in ("agent", "dynamics")}
+    assert trained <= {path.parent.name for path in kept}
+    assert list(around.iterdir()) == []
 
 
 def test_an_artifact_that_cannot_be_built(spec: Spec, plan: Plan, place: Place) -> None:
