@@ -244,18 +244,24 @@ def _report(words: list[str]) -> None:
     from orchestrator.merge import merge_again
     from orchestrator.reproduce import catch_up
     from orchestrator.rundir import RunDirectory
+    from sweeps.sweep import is_sweep, report_again
 
     def report(
         run: tyro.conf.Positional[Path], results: Path | None = None, force: bool = False
     ) -> None:
-        """Write a run's tables, figures and report again from its segments.
+        """Write a run's tables, figures and report again from its segments, or a sweep's.
 
         Args:
-            run: the run directory.
+            run: the directory of the run or sweep.
             results: also export each table to RESULTS/<table>/.
             force: let the exported tables replace larger ones.
         """
         directory = RunDirectory(run)
+        if is_sweep(directory):
+            with said_to_users():
+                report_again(directory, results, force=force)
+            OUTPUT.print(f"wrote {run / 'report' / 'index.md'}", markup=False)
+            return
         suite = is_suite(directory)  # a clear error where there is no run
         with directory.locked(), said_to_users():
             if suite:
@@ -337,7 +343,7 @@ COMMANDS: dict[str, tuple[Callable[[list[str]], None], str]] = {
     "run": (_run, "carry a spec out, or resume it; ends with tables and report"),
     "sweep": (_sweep, "search over a spec's fields, or resume it; ends with its winner"),
     "status": (_status, "how far a run directory is"),
-    "report": (_report, "write a run's report again, and export its tables"),
+    "report": (_report, "write a run's or sweep's report again, and export its tables"),
     "compare": (_compare, "two runs side by side, paired"),
     "doctor": (_doctor, "check this machine and the installation"),
     "gc": (_gc, "delete artifacts and blocks that no run directory needs"),

@@ -12,7 +12,7 @@ from orchestrator.provenance import provenance
 from orchestrator.reproduce import LazyExecutor, Settings
 from orchestrator.rundir import RunDirectory
 from orchestrator.store import storage_errors
-from orchestrator.structure import Plain, to_plain
+from orchestrator.structure import Plain, structure, to_plain
 from sweeps.arena import Arena, Tally
 from sweeps.confirm import confirm
 from sweeps.report import write_report
@@ -23,6 +23,7 @@ from sweeps.study import RESULT, SweepStudy, feasible
 from sweeps.table import write_table
 from sweeps.tracking import Tracker
 
+ASKED = "sweep.json"
 MAY_CHANGE = ("trials", "enqueued", "confirm", "title", "tables")  # under a study that goes on
 
 
@@ -91,10 +92,28 @@ def carry_out(
     return directory
 
 
+def is_sweep(directory: RunDirectory) -> bool:
+    """Whether a sweep was begun there."""
+    return (directory.path / ASKED).is_file()
+
+
+def report_again(directory: RunDirectory, results: Path | None, *, force: bool = False) -> None:
+    """Write the report of the trials that are finished; `results`, `force`: see `write_report`.
+
+    Raises UsageError where no trial is.
+    """
+    sweep = structure(SweepSpec, directory.read_json(ASKED), str(directory.path / ASKED))
+    with directory.locked(), storage_errors(directory.path):
+        study = SweepStudy(sweep, directory.path)
+        _write_trials(directory, study)
+        winner(directory, study)
+        write_report(sweep, study, directory, results, force=force)
+
+
 def settle(directory: RunDirectory, sweep: SweepSpec) -> None:
     """Claim the directory for a sweep, or check that its study is of the same one."""
     asked = json.loads(json.dumps(to_plain(sweep)))
-    before = directory.read_json("sweep.json") or asked
+    before = directory.read_json(ASKED) or asked
     changed = [
         f"{name}: {before.get(name)!r} → {value!r}"
         for name, value in asked.items()
@@ -105,7 +124,7 @@ def settle(directory: RunDirectory, sweep: SweepSpec) -> None:
             f"{directory.path} holds another study; choose another --out (finished blocks are "
             "shared), or go back to:\n  " + "\n  ".join(changed)
         )
-    directory.write_json("sweep.json", asked)
+    directory.write_json(ASKED, asked)
 
 
 def winner(directory: RunDirectory, study: SweepStudy) -> Plain:
@@ -113,7 +132,8 @@ def winner(directory: RunDirectory, study: SweepStudy) -> Plain:
     best = study.ranked()[:1]
     if not best:
         raise UsageError(
-            f"{directory.path}: no trial keeps to the constraints; loosen them under another --out"
+            f"{directory.path}: no trial is finished that keeps to the constraints; go on with the "
+            "sweep, or loosen them under another --out"
         )
     confirmed = (directory.read_json("confirm.json") or {}).get("trials", [{}])[0]
     return {
@@ -130,6 +150,11 @@ def winner(directory: RunDirectory, study: SweepStudy) -> Plain:
 def _write_results(
     directory: RunDirectory, study: SweepStudy, tally: Tally, earlier: Plain
 ) -> None:
+    _write_trials(directory, study)
+    _write_counts(directory, tally, earlier)
+
+
+def _write_trials(directory: RunDirectory, study: SweepStudy) -> None:
     trials = [
         {
             "trial": trial.number,
@@ -141,7 +166,6 @@ def _write_results(
         for trial in study.finished
     ]
     directory.write_json("trials.json", trials)
-    _write_counts(directory, tally, earlier)
 
 
 def _write_counts(directory: RunDirectory, tally: Tally, earlier: Plain) -> None:

@@ -14,7 +14,7 @@ import pytest
 from analysis.results import extent_of, provenance_text
 from orchestrator import locking
 from orchestrator.cli import main
-from orchestrator.errors import LockedError
+from orchestrator.errors import LockedError, UsageError
 from orchestrator.progress import Silent
 from orchestrator.rundir import RunDirectory
 from orchestrator.spec import TableSpec
@@ -50,6 +50,32 @@ def test_what_a_user_sees(done: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert f"report: {done / 'sweep' / 'report' / 'index.md'}" in out
     figures = {path.name for path in (done / "sweep" / "report" / "figures").glob("*.svg")}
     assert figures == {"history.svg", "importances.svg", "slices.svg", "alpha-beta.svg"}
+
+
+def test_a_report_is_written_again(done: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """From the study alone: nothing is played, and the bytes are those of the sweep's own."""
+    sweep, results = done / "sweep", done / "results"
+    main(command(done))
+    capsys.readouterr()
+    before = {path.name: path.read_bytes() for path in (sweep / "report").glob("*.*")}
+    shutil.rmtree(sweep / "report")
+    (sweep / "trials.json").unlink()
+    shutil.rmtree(results)
+    main(["report", str(sweep), "--results", str(results)])
+    assert capsys.readouterr().out == f"wrote {sweep / 'report' / 'index.md'}\n"
+    assert {path.name: path.read_bytes() for path in (sweep / "report").glob("*.*")} == before
+    (exported,) = results.iterdir()
+    assert (exported / "index.md").read_bytes() == before["index.md"]
+
+
+def test_a_report_of_a_sweep_without_a_finished_trial_says_so(
+    done: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (done / "sweep" / "study.journal").unlink()
+    with pytest.raises(SystemExit) as end:
+        main(["report", str(done / "sweep")])
+    assert end.value.code == UsageError.exit_code
+    assert "no trial" in capsys.readouterr().err
 
 
 def test_nothing_is_exported_unless_it_is_asked_for(

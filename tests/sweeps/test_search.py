@@ -128,7 +128,7 @@ def test_several_objectives_and_constraints(trained: Path) -> None:
 
 
 def test_constraints_that_no_trial_keeps_to_are_an_error(trained: Path) -> None:
-    with pytest.raises(UsageError, match="no trial keeps to the constraints"):
+    with pytest.raises(UsageError, match="no trial is finished that keeps to the constraints"):
         sweep_in(trained, tiny_sweep(constraints={"imagined": 0.0}, confirm=UNCONFIRMED, trials=2))
 
 
