@@ -1,4 +1,4 @@
-"""The front door: `skillstitch plan | run | sweep | status | report | …`."""
+"""The front door: `skillstitch plan | run | sweep | status | list | report | …`."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from importlib.metadata import version
 from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any
@@ -74,6 +75,9 @@ def _dispatch(words: list[str]) -> None:
     name, rest = (words[0], words[1:]) if words else ("--help", [])
     if name in ("-h", "--help"):
         OUTPUT.print(_usage(), markup=False)
+        return
+    if name == "--version":
+        OUTPUT.print(f"skillstitch {version('skillstitch')}", markup=False)
         return
     if name not in COMMANDS:
         raise UsageError(f"unknown command {name!r}; there are {', '.join(COMMANDS)}")
@@ -239,6 +243,21 @@ def _status(words: list[str]) -> None:
     tyro.cli(status, args=words, prog="skillstitch status")
 
 
+def _list(words: list[str]) -> None:
+    from orchestrator.listing import listing_lines
+
+    def list_(folder: tyro.conf.Positional[Path] = Path("runs")) -> None:
+        """Every run and sweep in a folder: what was asked, how far it is, when it last went on.
+
+        Args:
+            folder: the folder.
+        """
+        for line in listing_lines(folder):
+            OUTPUT.print(line, markup=False)
+
+    tyro.cli(list_, args=words, prog="skillstitch list")
+
+
 def _report(words: list[str]) -> None:
     from analysis.report import build_report
     from orchestrator.merge import merge_again
@@ -343,6 +362,7 @@ COMMANDS: dict[str, tuple[Callable[[list[str]], None], str]] = {
     "run": (_run, "carry a spec out, or resume it; ends with tables and report"),
     "sweep": (_sweep, "search over a spec's fields, or resume it; ends with its winner"),
     "status": (_status, "how far a run directory is"),
+    "list": (_list, "every run and sweep in a folder, and how far each is"),
     "report": (_report, "write a run's or sweep's report again, and export its tables"),
     "compare": (_compare, "two runs side by side, paired"),
     "doctor": (_doctor, "check this machine and the installation"),

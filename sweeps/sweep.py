@@ -7,6 +7,7 @@ from pathlib import Path
 
 from orchestrator import locking
 from orchestrator.errors import ChangedError, UsageError
+from orchestrator.listing import ASKED_OF_A_SWEEP as ASKED
 from orchestrator.progress import Progress
 from orchestrator.provenance import provenance
 from orchestrator.reproduce import LazyExecutor, Settings
@@ -23,7 +24,6 @@ from sweeps.study import RESULT, SweepStudy, feasible
 from sweeps.table import write_table
 from sweeps.tracking import Tracker
 
-ASKED = "sweep.json"
 MAY_CHANGE = ("trials", "enqueued", "confirm", "title", "tables")  # under a study that goes on
 
 
