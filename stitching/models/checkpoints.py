@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
+import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
@@ -50,11 +50,15 @@ class Checkpoint:
 
     @classmethod
     def of(cls, *labels: Label) -> Checkpoint | None:
-        """That of the training with these labels; None where none are to be left."""
+        """That of the training with these labels; None where none are to be left.
+
+        Other versions of torch and numpy go on with their own: they round otherwise.
+        """
         folder = _FOLDER.get()
         if folder is None or not folder.parent.is_dir():
             return None
-        name = hashlib.blake2b(json.dumps(labels).encode(), digest_size=16).hexdigest()
+        told_apart = json.dumps([torch.__version__, np.__version__, *labels])
+        name = hashlib.blake2b(told_apart.encode(), digest_size=16).hexdigest()
         return cls(folder / name)
 
     def write(self, tensors: dict[str, Tensor], plain: dict[str, Any]) -> None:
@@ -62,7 +66,7 @@ class Checkpoint:
         text = np.frombuffer(json.dumps(plain).encode(), dtype=np.uint8)
         data = save({name: tensor.detach().contiguous() for name, tensor in tensors.items()}
                     | {_PLAIN: torch.from_numpy(text.copy())})  # fmt: skip
-        temporary = self.path.with_name(f"{self.path.name}.{os.getpid()}.tmp")
+        temporary = self.path.with_name(f"{self.path.name}.{uuid.uuid4().hex}.tmp")
         with suppress(OSError):
             self.path.parent.mkdir(exist_ok=True)
             try:

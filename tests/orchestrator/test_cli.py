@@ -95,7 +95,10 @@ def test_every_field_of_a_spec_is_an_option(cli: Cli) -> None:
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (["rnu"], "unknown command 'rnu'; there are plan, run, sweep, status, list, report, compare"),
+        (
+            ["rnu"],
+            "unknown command 'rnu'; there are plan, run, sweep, status, list, report, compare",
+        ),
         (["plan"], "skillstitch plan needs a spec: table1"),
         (["run", "--seeds", "3"], "skillstitch run needs a spec: table1"),
         (["plan", "table99"], "no spec 'table99': neither a file nor one of table1"),
