@@ -97,7 +97,7 @@ def test_every_field_of_a_spec_is_an_option(cli: Cli) -> None:
     [
         (
             ["rnu"],
-            "unknown command 'rnu'; there are plan, run, sweep, status, list, report, compare",
+            "unknown command 'rnu'; there are plan, run, sweep, status, list, report",
         ),
         (["plan"], "skillstitch plan needs a spec: table1"),
         (["run", "--seeds", "3"], "skillstitch run needs a spec: table1"),
