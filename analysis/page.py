@@ -148,7 +148,7 @@ def _quarantine(run: Run) -> str:
 
 
 def _table_section(table: Table, drawn: list[Drawn], figures: Path) -> str:
-    notes = [*describe(table), explanation(table), error_reading(table.scores)]
+    notes = [*describe(table), explanation(table), error_reading(table)]
     return "".join(
         [
             f'<p class="notice">{escape(notes.pop(0))}</p>' if table.missing else "",

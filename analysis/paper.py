@@ -22,7 +22,8 @@ def _read() -> pd.DataFrame:
 def paper_table(number: str) -> pd.DataFrame:
     """Columns row, tasks, method, score, error, note of a table of the paper; empty if it has none.
 
-    `tasks` is over how many tasks a row's scores are means: all permutations of that length.
+    `tasks` is over how many tasks a row's scores are means: in Tables 1 and 2 all permutations of
+    that length, in Table 8 those that end with its skill, elsewhere one.
     `error` is the number after the paper's ±, which it calls the variance over three seeds.
     """
     cells = _read()

@@ -98,7 +98,7 @@ def _cells(episodes: pd.DataFrame, places: pd.DataFrame) -> Cells:
 def _other_tasks(
     tasks_of_cell: Mapping[tuple[str, str], int], entry: TableEntry
 ) -> dict[str, tuple[int, int]]:
-    """Rows that are means over other tasks than the paper's: how many here, how many there."""
+    """Rows that are means over another number of tasks than the paper's: here, and there."""
     printed = paper_tasks(entry.paper)
     return {
         row: (tasks, printed[row])

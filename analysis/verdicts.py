@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from analysis.paper import HALF_DIGIT, accomplished_skills, paper_table
 from analysis.tables import Table
@@ -158,8 +157,10 @@ def _constant_skills(table: Table) -> list[Claim]:
     cells = table.scores.query("method == @method").dropna(subset="paper_score").set_index("row")
     ours = cells["score"] * [int(row.split()[0]) for row in cells.index]
     text = f"{table.labels[method]} accomplishes the same number of skills at every length"
+    if cells.empty:
+        return []
     if ours.isna().any() or len(ours) < 2:
-        return [Claim(text, NO_DATA, "needs at least two lengths")]
+        return [Claim(text, NO_DATA, "needs at least two of the paper's lengths")]
     detail = ", ".join(f"{skills:.3f} in {row}" for row, skills in ours.items())
     constant = np.ptp(ours) <= SAME_SKILLS
     return [
@@ -173,9 +174,11 @@ def _constant_skills(table: Table) -> list[Claim]:
     ]
 
 
-def error_reading(scores: pd.DataFrame) -> str:
+def error_reading(table: Table) -> str:
     """Which reading of the paper's ± our own spread over seeds matches better, in a sentence."""
-    cells = scores.dropna(subset=["score", "paper_error"])
+    if table.spec.scale == SMOKE:
+        return ""
+    cells = table.scores.dropna(subset=["score", "paper_error"])
     if cells.empty:
         return ""
     if (cells["seeds"] < 2).all():

@@ -114,7 +114,7 @@ def short_of(table: Table, row: str, method: str) -> str:
 def to_markdown(table: Table) -> str:
     """Scores, gains, claims, and how to read them."""
     head = [f"# {table.entry.title}", "", *(f"{line}\n" for line in describe(table))]
-    body = [_markdown_scores(table), "", explanation(table), "", error_reading(table.scores)]
+    body = [_markdown_scores(table), "", explanation(table), "", error_reading(table)]
     if not table.gains.empty:
         body += ["", "## Paired gains", "", _markdown_gains(table)]
     found = claims(table)

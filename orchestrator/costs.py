@@ -176,7 +176,10 @@ def _steps_in_tree(plan: Plan) -> int:
 
 
 def _training_history(store: Store) -> dict[tuple[str, str], float]:
-    """Seconds that artifacts of a kind and size took before on this machine's store."""
+    """Seconds that artifacts of a kind and size took before on this machine's store.
+
+    The longest: one that went on from a checkpoint took less.
+    """
     seconds: dict[tuple[str, str], float] = {}
     for kind, key in store.artifacts():
         try:
@@ -184,7 +187,8 @@ def _training_history(store: Store) -> dict[tuple[str, str], float]:
         except CorruptArtifactError:
             continue
         recipe = Recipe(made["kind"], made["params"], made["inputs"])
-        seconds[_size_class(recipe)] = made["seconds"]
+        size = _size_class(recipe)
+        seconds[size] = max(made["seconds"], seconds.get(size, 0.0))
     return seconds
 
 

@@ -49,13 +49,19 @@ def _collect(store: Store, needed: set[str], *, delete: bool) -> Iterator[str]:
             if delete:
                 shutil.rmtree(folder)
             yield f"{verb} {folder}"
-    for leftovers in (store.root / name for name in ("incoming", "corrupt", "checkpoints")):
+    for leftovers in (store.root / "incoming", store.root / "corrupt"):
         for folder in sorted(leftovers.glob("*")):
             if time.time() - folder.stat().st_mtime < SECONDS_TO_WRITE:
                 continue  # somebody may be writing it
             freed += _size(folder)
             if delete:
                 shutil.rmtree(folder)
+            yield f"{verb} {folder}"
+    for key, folder in list(store.unfinished()):
+        if key not in needed:
+            freed += _size(folder)
+            if delete:
+                store.drop_checkpoints(key)
             yield f"{verb} {folder}"
     shared = Ledger(store.root / "blocks.sqlite")
     stale = shared.finished() - needed

@@ -143,14 +143,22 @@ class Store:
 
     def checkpoints(self, key: str) -> Path:
         """Where trainings of an artifact may leave checkpoints: only who sees this store does."""
-        around = self.root.resolve() / "checkpoints"
+        folder = self._checkpoints(key)
         with storage_errors(self.root):
-            around.mkdir(parents=True, exist_ok=True)
-        return around / key
+            folder.parent.mkdir(parents=True, exist_ok=True)
+        return folder
 
     def drop_checkpoints(self, key: str) -> None:
         """Once the artifact is there they are of no use."""
-        shutil.rmtree(self.checkpoints(key), ignore_errors=True)
+        shutil.rmtree(self._checkpoints(key), ignore_errors=True)
+
+    def unfinished(self) -> Iterator[tuple[str, Path]]:
+        """Keys of artifacts whose trainings have left checkpoints, and where."""
+        for folder in sorted(self._checkpoints("").glob("*")):
+            yield folder.name, folder
+
+    def _checkpoints(self, key: str) -> Path:
+        return self.root.resolve() / "checkpoints" / key
 
     def artifacts(self) -> Iterator[tuple[str, str]]:
         """All complete artifacts."""

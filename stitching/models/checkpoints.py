@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -52,12 +53,14 @@ class Checkpoint:
     def of(cls, *labels: Label) -> Checkpoint | None:
         """That of the training with these labels; None where none are to be left.
 
-        Other versions of torch and numpy go on with their own: they round otherwise.
+        Workers of other versions of torch and numpy, or with other instructions, go on with their
+        own: they round otherwise.
         """
         folder = _FOLDER.get()
-        if folder is None or not folder.parent.is_dir():
+        if folder is None or not os.path.isdir(folder.parent):  # Path.is_dir raises on EACCES
             return None
-        told_apart = json.dumps([torch.__version__, np.__version__, *labels])
+        where = [torch.__version__, np.__version__, torch.backends.cpu.get_cpu_capability()]
+        told_apart = json.dumps([*where, *labels], default=int)
         name = hashlib.blake2b(told_apart.encode(), digest_size=16).hexdigest()
         return cls(folder / name)
 

@@ -23,6 +23,10 @@ ACTIVATIONS: dict[Activation, Callable[[Tensor], Tensor]] = {
 }
 
 
+MINIBATCH = 1024
+"""Rows up to which a layer of one output is computed as in training."""
+
+
 def init_mlp(members: int, sizes: Sequence[int], rng: np.random.Generator) -> Params:
     """Weights `w0, b0, w1, b1, …` of `members` perceptrons with these layer sizes.
 
@@ -41,9 +45,11 @@ def init_mlp(members: int, sizes: Sequence[int], rng: np.random.Generator) -> Pa
 def affine(inputs: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
     """One layer of all members: (members, n, in) → (members, n, out), as precise as its weights.
 
-    A single output in float32 is a product and a sum: `baddbmm` takes twice as long for it.
+    A minibatch's single output in float32 is a product and a sum: `baddbmm` takes several times as
+    long for it, and less from some thousand rows on.
     """
-    if weight.shape[-1] == 1 and weight.dtype == torch.float32:
+    single = weight.shape[-1] == 1 and weight.dtype == torch.float32
+    if single and inputs.shape[-2] <= MINIBATCH:
         return (inputs * weight.mT).sum(-1, keepdim=True) + bias
     return torch.baddbmm(bias, inputs.to(weight.dtype), weight)
 
@@ -89,7 +95,7 @@ def at_precision(params: Params, precision: Precision, *, output: bool = False) 
 
 
 def prefixed(params: Params, prefix: str) -> dict[str, np.ndarray]:
-    """Parameters as arrays named `prefix.name`, as checkpoints keep them."""
+    """Parameters as arrays named `prefix.name`, as artifacts keep them."""
     return {f"{prefix}.{name}": tensor.detach().numpy() for name, tensor in params.items()}
 
 

@@ -89,6 +89,7 @@ def test_a_smoke_run_is_not_judged(table: Table) -> None:
     assert set(cell_verdicts(smoke)) == {NOT_JUDGED}
     assert claims(smoke) == []
     assert explanation(smoke) == SMOKE_EXPLANATION
+    assert error_reading(smoke) == ""
 
 
 def test_rows_of_other_tasks_make_no_claim(segments: Any, spec: RunSpec) -> None:
@@ -98,6 +99,8 @@ def test_rows_of_other_tasks_make_no_claim(segments: Any, spec: RunSpec) -> None
     verdicts = dict(zip(table.scores["row"], cell_verdicts(table), strict=True))
     assert verdicts["2 goals"] == NOT_PRINTED
     assert verdicts["3 goals"] in (AGREES, HIGHER, LOWER)
+    alone = replace(table, scores=table.scores.assign(paper_score=np.nan), leads=table.leads[:0])
+    assert claims(alone) == []
     texts = [claim.text for claim in claims(table)]
     assert not any("2 goals" in text for text in texts)
     assert any("3 goals" in text for text in texts)
@@ -121,12 +124,16 @@ def test_table_2_does_not_claim_constant_skills(table: Table) -> None:
     assert not any("same number" in claim.text for claim in claims(kitchen))
 
 
-def test_reading_of_the_papers_error() -> None:
+def test_reading_of_the_papers_error(table: Table) -> None:
     scores = pd.DataFrame(
         {"score": 0.5, "variance": [0.0004, 0.0001], "std": [0.02, 0.01], "seeds": 3,
          "paper_error": [0.0, 0.0]}
     )  # fmt: skip
-    assert "variance over seeds in 2 of 2 cells" in error_reading(scores)
-    assert "the variance better" in error_reading(scores)
-    assert "One seed" in error_reading(scores.assign(seeds=1))
-    assert error_reading(scores.assign(paper_error=np.nan)) == ""
+
+    def reading(scores: pd.DataFrame) -> str:
+        return error_reading(replace(table, scores=scores))
+
+    assert "variance over seeds in 2 of 2 cells" in reading(scores)
+    assert "the variance better" in reading(scores)
+    assert "One seed" in reading(scores.assign(seeds=1))
+    assert reading(scores.assign(paper_error=np.nan)) == ""

@@ -410,6 +410,12 @@ def test_gc(cli: Cli, done: Place, plan: Plan, expected: dict[str, bytes], spec:
         finally:
             shared.close()
 
+    wanted, unwanted = (
+        done.store.checkpoints(key) for key in (plan.agents[0], "of-no-run-that-is-kept")
+    )
+    for folder in (wanted, unwanted):
+        folder.mkdir()
+
     before = everything()
     assert "would delete 0 blocks" in cli("gc", done.out, other, "--store", done.store_root).out
     answer = cli("gc", done.out, "--store", done.store_root)
@@ -422,7 +428,9 @@ def test_gc(cli: Cli, done: Place, plan: Plan, expected: dict[str, bytes], spec:
     artifacts, blocks = everything()
     assert {key for _, key in artifacts} == set(plan.recipes)
     assert blocks == done.finished_blocks()
-    assert answer.out.count("deleted ") == len(before[0]) - len(artifacts) + 1
+    assert answer.out.count("deleted ") == len(before[0]) - len(artifacts) + 2
+    assert wanted.is_dir()
+    assert not unwanted.exists()
     with mock.patch("orchestrator.reproduce.open_executor", side_effect=AssertionError):
         assert cli("run", *options(done)).code == 0
     assert promised_bytes(done.out) == expected

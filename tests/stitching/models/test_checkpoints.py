@@ -1,17 +1,22 @@
 """A training that was killed goes on from its last checkpoint and ends with the same bytes."""
 
+import os
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 from torch import Tensor
 
 from stitching.envs.maze import MAZE
+from stitching.envs.protocol import ActionSpace
 from stitching.models import training
 from stitching.models.checkpoints import Checkpoint, checkpoints_in
 from stitching.models.dynamics import DynamicsConfig, train_dynamics
 from stitching.models.iql import IQLConfig, train_iql, train_single_tasks
+from stitching.models.layers import parameters
 from stitching.models.training import DRAWN_AT_ONCE, CurveLog, Trained
 from tests.stitching.models.test_iql import experience_of
 
@@ -26,6 +31,15 @@ def agent() -> Trained:
 
 def single_tasks() -> Trained:
     return train_single_tasks(experience_of(MAZE.actions), MAZE.actions, IQL, "checkpoints")
+
+
+def gaussian() -> Trained:
+    """Continuous actions, half precision, and a policy that goes on from another."""
+    arm = ActionSpace(3, discrete=False)
+    config = replace(IQL, precision="bfloat16", learning_rate_decay=False)
+    start = train_iql(experience_of(arm), arm, replace(config, updates=0), "start").weights
+    policy = parameters(start, "policy")
+    return train_iql(experience_of(arm), arm, config, "checkpoints", policy_from=policy)
 
 
 def dynamics() -> Trained:
@@ -63,7 +77,7 @@ def assert_same(found: Trained, expected: Trained) -> None:
     assert found.curves == expected.curves
 
 
-@pytest.mark.parametrize("train", [agent, single_tasks, dynamics])
+@pytest.mark.parametrize("train", [agent, single_tasks, gaussian, dynamics])
 @pytest.mark.parametrize("killed_after", [300, 2 * DRAWN_AT_ONCE])
 def test_a_killed_training_goes_on_to_the_same_bytes(
     train: Callable[[], Trained],
@@ -117,6 +131,33 @@ def test_nothing_is_left_where_nobody_asked(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_folder_that_may_not_be_looked_into_counts_as_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_: object, **__: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    with checkpoints_in(tmp_path / "own"), monkeypatch.context() as patch:
+        patch.setattr(os, "stat", refused)
+        assert Checkpoint.of("x") is None
+
+
+def test_no_checkpoint_before_a_minute_is_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(training, "SECONDS_BETWEEN_CHECKPOINTS", 3600.0)
+    with checkpoints_in(tmp_path / "own"):
+        dynamics()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_other_machines_have_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with checkpoints_in(tmp_path / "own"):
+        here = Checkpoint.of("x")
+        monkeypatch.setattr(torch.backends.cpu, "get_cpu_capability", lambda: "ANOTHER")
+        assert Checkpoint.of("x") != here
+
+
 def test_a_folder_that_takes_nothing_costs_the_checkpoint_alone(tmp_path: Path) -> None:
     (tmp_path / "own").write_text("a file where the folder should be")
     expected = dynamics()
@@ -130,3 +171,4 @@ def test_trainings_of_other_labels_have_their_own(tmp_path: Path) -> None:
         assert first is not None
         assert first != other
         assert first == Checkpoint.of("agent", 0)
+        assert first == Checkpoint.of("agent", np.int64(0))  # type: ignore[arg-type]
