@@ -1,4 +1,4 @@
-"""Ensembles of multi-layer perceptrons: stacked weights, one call a layer for all members."""
+"""Ensembles of multi-layer perceptrons: stacked weights, one `baddbmm` a layer for all members."""
 
 from __future__ import annotations
 
@@ -23,10 +23,6 @@ ACTIVATIONS: dict[Activation, Callable[[Tensor], Tensor]] = {
 }
 
 
-MINIBATCH = 1024
-"""Rows up to which a layer of one output is computed as in training."""
-
-
 def init_mlp(members: int, sizes: Sequence[int], rng: np.random.Generator) -> Params:
     """Weights `w0, b0, w1, b1, …` of `members` perceptrons with these layer sizes.
 
@@ -40,18 +36,6 @@ def init_mlp(members: int, sizes: Sequence[int], rng: np.random.Generator) -> Pa
             draw = rng.uniform(-bound, bound, size=shape).astype(np.float32)
             params[f"{kind}{layer}"] = torch.from_numpy(draw)
     return params
-
-
-def affine(inputs: Tensor, weight: Tensor, bias: Tensor) -> Tensor:
-    """One layer of all members: (members, n, in) → (members, n, out), as precise as its weights.
-
-    A minibatch's single output in float32 is a product and a sum: `baddbmm` takes several times as
-    long for it, and less from some thousand rows on.
-    """
-    single = weight.shape[-1] == 1 and weight.dtype == torch.float32
-    if single and inputs.shape[-2] <= MINIBATCH:
-        return (inputs * weight.mT).sum(-1, keepdim=True) + bias
-    return torch.baddbmm(bias, inputs.to(weight.dtype), weight)
 
 
 def mlp(
@@ -70,7 +54,8 @@ def mlp(
     members = params["w0"].shape[0]
     hidden = inputs.expand(members, -1, -1) if inputs.dim() == 2 else inputs
     for layer in range(layers):
-        hidden = affine(hidden, params[f"w{layer}"], params[f"b{layer}"])
+        weight = params[f"w{layer}"]
+        hidden = torch.baddbmm(params[f"b{layer}"], hidden.to(weight.dtype), weight)
         if layer < layers - 1:
             hidden = ACTIVATIONS[activation](hidden)
             if dropout:
