@@ -115,7 +115,9 @@ def test_a_row_is_a_part_s_own_numbers(finished: Path) -> None:
     for row, method in table.index:
         own = own_scores(out, row)[method]
         assert table["score"][row, method] == pytest.approx(own, abs=1e-6)
-    assert table["paper_score"]["level-1", "mb-stitch"] == pytest.approx(0.314)
+    # Table 5's rows are means over one task, and not over the maze's.
+    assert len(levels().parts[0].spec.all_tasks) > 1
+    assert table["paper_score"].isna().all()
     gains = pd.read_csv(out / "report" / "levels-gains.csv")
     asked = levels().parts[0].spec
     assert set(gains["pairs"]) == {len(asked.all_tasks) * asked.episodes}
