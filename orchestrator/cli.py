@@ -263,7 +263,6 @@ def _report(words: list[str]) -> None:
     from orchestrator.merge import merge_again
     from orchestrator.reproduce import catch_up
     from orchestrator.rundir import RunDirectory
-    from sweeps.sweep import is_sweep, report_again
 
     def report(
         run: tyro.conf.Positional[Path], results: Path | None = None, force: bool = False
@@ -276,7 +275,9 @@ def _report(words: list[str]) -> None:
             force: let the exported tables replace larger ones.
         """
         directory = RunDirectory(run)
-        if is_sweep(directory):
+        if directory.asked_sweep():
+            from sweeps.sweep import report_again
+
             with said_to_users():
                 report_again(directory, results, force=force)
             OUTPUT.print(f"wrote {run / 'report' / 'index.md'}", markup=False)

@@ -11,7 +11,6 @@ from orchestrator.errors import UsageError
 from orchestrator.rundir import RunDirectory
 from orchestrator.structure import Plain
 
-ASKED_OF_A_SWEEP = "sweep.json"
 STORE = "blocks.sqlite"
 
 
@@ -43,8 +42,10 @@ def _run_folders(root: Path) -> Iterator[Path]:
 def _row(folder: Path) -> tuple[str, str, str, str]:
     directory = RunDirectory(folder)
     try:
-        asked = directory.read_json(ASKED_OF_A_SWEEP) or directory.asked()
-        what, state = f"{asked['name']} at {asked['scale']} scale", _state(directory, asked)
+        sweep = directory.asked_sweep()
+        asked = sweep or directory.asked()
+        what = f"{asked['name']} at {asked['scale']} scale"
+        state = _progress(directory, sweep) if sweep else _state(directory)
     except (ValueError, KeyError):
         what, state = "unreadable", "its spec.json is damaged, or of another version"
     newest = max(path.stat().st_mtime for path in folder.iterdir())
@@ -52,9 +53,11 @@ def _row(folder: Path) -> tuple[str, str, str, str]:
     return str(folder), what, state, when
 
 
-def _state(directory: RunDirectory, asked: Plain) -> str:
-    if (directory.path / ASKED_OF_A_SWEEP).is_file():
-        return f"{len(directory.read_json('trials.json') or [])} of {asked['trials']} trials"
+def _progress(directory: RunDirectory, sweep: Plain) -> str:
+    return f"{len(directory.read_json('trials.json') or [])} of {sweep['trials']} trials"
+
+
+def _state(directory: RunDirectory) -> str:
     if directory.played:
         return "finished"
     if given_up := directory.read_json("quarantine.json"):

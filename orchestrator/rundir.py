@@ -22,6 +22,7 @@ from orchestrator.spec import Spec, TableSpec, differences, spec_from_plain
 from orchestrator.store import USUAL_STORE, write_atomically
 from orchestrator.structure import Plain, to_plain
 
+SWEEP = "sweep.json"
 REPORT_SOURCES = (".py", ".csv", ".html", ".css", ".js")
 
 
@@ -126,6 +127,11 @@ class RunDirectory:
         if not path.is_file():
             raise UsageError(f"{self.path} is no run directory: it has no spec.json")
         plain: Plain = json.loads(path.read_text())
+        return plain
+
+    def asked_sweep(self) -> Plain | None:
+        """What was asked of the sweep that was begun here; None where none was."""
+        plain: Plain | None = self.read_json(SWEEP)
         return plain
 
     def write_json(self, name: str, content: Any) -> None:

@@ -7,11 +7,10 @@ from pathlib import Path
 
 from orchestrator import locking
 from orchestrator.errors import ChangedError, UsageError
-from orchestrator.listing import ASKED_OF_A_SWEEP as ASKED
 from orchestrator.progress import Progress
 from orchestrator.provenance import provenance
 from orchestrator.reproduce import LazyExecutor, Settings
-from orchestrator.rundir import RunDirectory
+from orchestrator.rundir import SWEEP, RunDirectory
 from orchestrator.store import storage_errors
 from orchestrator.structure import Plain, structure, to_plain
 from sweeps.arena import Arena, Tally
@@ -92,17 +91,12 @@ def carry_out(
     return directory
 
 
-def is_sweep(directory: RunDirectory) -> bool:
-    """Whether a sweep was begun there."""
-    return (directory.path / ASKED).is_file()
-
-
 def report_again(directory: RunDirectory, results: Path | None, *, force: bool = False) -> None:
     """Write the report of the trials that are finished; `results`, `force`: see `write_report`.
 
     Raises UsageError where no trial is.
     """
-    sweep = structure(SweepSpec, directory.read_json(ASKED), str(directory.path / ASKED))
+    sweep = structure(SweepSpec, directory.asked_sweep(), str(directory.path / SWEEP))
     with directory.locked(), storage_errors(directory.path):
         study = SweepStudy(sweep, directory.path)
         _write_trials(directory, study)
@@ -113,7 +107,7 @@ def report_again(directory: RunDirectory, results: Path | None, *, force: bool =
 def settle(directory: RunDirectory, sweep: SweepSpec) -> None:
     """Claim the directory for a sweep, or check that its study is of the same one."""
     asked = json.loads(json.dumps(to_plain(sweep)))
-    before = directory.read_json(ASKED) or asked
+    before = directory.asked_sweep() or asked
     changed = [
         f"{name}: {before.get(name)!r} → {value!r}"
         for name, value in asked.items()
@@ -124,7 +118,7 @@ def settle(directory: RunDirectory, sweep: SweepSpec) -> None:
             f"{directory.path} holds another study; choose another --out (finished blocks are "
             "shared), or go back to:\n  " + "\n  ".join(changed)
         )
-    directory.write_json(ASKED, asked)
+    directory.write_json(SWEEP, asked)
 
 
 def winner(directory: RunDirectory, study: SweepStudy) -> Plain:

@@ -65,8 +65,11 @@ class Checkpoint:
         return cls(folder / name)
 
     def write(self, tensors: dict[str, Tensor], plain: dict[str, Any]) -> None:
-        """Replace the file whole; a disk that refuses costs the checkpoint alone."""
-        text = np.frombuffer(json.dumps(plain).encode(), dtype=np.uint8)
+        """Replace the file whole; a disk that refuses costs the checkpoint alone.
+
+        Arrays in `plain` come back as lists.
+        """
+        text = np.frombuffer(json.dumps(plain, default=np.ndarray.tolist).encode(), dtype=np.uint8)
         data = save({name: tensor.detach().contiguous() for name, tensor in tensors.items()}
                     | {_PLAIN: torch.from_numpy(text.copy())})  # fmt: skip
         temporary = self.path.with_name(f"{self.path.name}.{uuid.uuid4().hex}.tmp")

@@ -6,7 +6,6 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 import torch
@@ -93,7 +92,7 @@ class Training:
             tensors["dropout"] = self.dropout.get_state()
         plain = {
             "done": done,
-            "batches": _as_lists(self.batches.bit_generator.state),
+            "batches": self.batches.bit_generator.state,
             "curves": self.log.curves,
         }
         checkpoint.write(tensors, plain)
@@ -121,10 +120,3 @@ class Training:
             {name: [(at, value) for at, value in curve] for name, curve in plain["curves"].items()}
         )
         return int(plain["done"])
-
-
-def _as_lists(state: Any) -> Any:
-    """A generator's state, arrays as lists."""
-    if isinstance(state, dict):
-        return {name: _as_lists(value) for name, value in state.items()}
-    return state.tolist() if isinstance(state, np.ndarray) else state
