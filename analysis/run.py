@@ -67,6 +67,7 @@ class RunSpec:
     own_first_skill: frozenset[str] = frozenset()  # methods whose first skill nobody shares
     block_episodes: int = 1  # episodes that are played, and lost, together
     parts: tuple[PartEntry, ...] = ()  # the runs that this one was merged from, if it was
+    models: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # kinds, by method
     long_task: str = ""  # what Single-Policy learned, uncut; "" of a merged run
     settings: Mapping[str, object] = field(default_factory=dict)  # all that was asked, by path
 
@@ -90,6 +91,7 @@ class RunSpec:
                 own_first_skill=frozenset(
                     m["name"] for m in spec["methods"] if m.get("own_first_skill", False)
                 ),
+                models={m["name"]: tuple(m.get("models", ())) for m in spec["methods"]},
                 block_episodes=spec.get("spec", {}).get("block_episodes", 1),
                 long_task=spec.get("spec", {}).get("single_policy", {}).get("task", ""),
                 settings=_settings(spec.get("spec", {})),

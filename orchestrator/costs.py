@@ -10,11 +10,12 @@ from typing import Literal
 from orchestrator.jobs import BlockTask
 from orchestrator.kits import KITS
 from orchestrator.ledger import Ledger, Played
-from orchestrator.methods import PlanningConfig, method_of, method_rollout
+from orchestrator.methods import method_rollout
 from orchestrator.plan import Node, Plan
 from orchestrator.recipes import Recipe
 from orchestrator.spec import Spec
 from orchestrator.store import CorruptArtifactError, Store
+from stitching.methods.planning import PlanningSettings
 
 OTHER_SECONDS = 1.0  # of what nobody measured, such as data of the maze
 
@@ -132,7 +133,7 @@ def seconds_each(task: BlockTask, history: Mapping[str, Played]) -> float:
     if task.kind in history:
         return history[task.kind].seconds_each
     costs = KITS[task.benchmark].costs
-    plans = task.method and issubclass(method_of(task.method).config, PlanningConfig)
+    plans = isinstance(task.settings, PlanningSettings)
     return costs.planned_segment if plans else costs.segment
 
 

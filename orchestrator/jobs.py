@@ -9,7 +9,9 @@ from typing import Literal
 from orchestrator.ledger import Outcome
 from orchestrator.recipes import Recipe
 from orchestrator.store import Artifact
-from orchestrator.structure import Plain
+from stitching.methods.protocol import MethodSettings
+from stitching.models.dynamics import DynamicsConfig
+from stitching.rollout import RolloutConfig
 
 ATTEMPTS = 3  # at one job, before it is given up
 
@@ -34,14 +36,14 @@ class BlockTask:
     benchmark: str
     root_seed: int
     seed: int
-    method: str  # "" for first skills that methods share
-    stitcher: Plain  # the method's configuration; empty for those
+    method: str  # its name; SHARED for first skills that methods share
+    settings: MethodSettings
     prefix: tuple[str, ...]
     episodes: tuple[int, int]  # first and one past the last, of the whole block
     step_limit: int
-    rollout: Plain
+    rollout: RolloutConfig
     artifacts: dict[str, str]  # kind → key: the policies, and what the stitcher needs
-    configs: Plain  # kind → how it was trained, where loading it needs to know
+    configs: dict[str, DynamicsConfig]  # kind → how it was trained, where loading needs to know
 
     @property
     def kind(self) -> str:

@@ -12,7 +12,7 @@ import pandas as pd
 from analysis.run import SEPARATOR, VARIANT, plain_label
 from orchestrator.errors import UsageError
 from orchestrator.kits import KITS
-from orchestrator.methods import first_method, method_label
+from orchestrator.methods import first_method, method_label, method_of
 from orchestrator.rundir import RunDirectory
 from orchestrator.structure import Plain, to_plain
 from orchestrator.suite import Part, Suite, part_directory, suite_of
@@ -87,6 +87,7 @@ def describe_suite(suite: Suite) -> Plain:
                     "name": name,
                     "label": Naming(suite, part).label(method),
                     "own_first_skill": has_own_first_skill(suite, method),
+                    "models": list(method_of(method).models),
                 }
                 for part in suite.parts
                 for method in part.spec.methods

@@ -5,25 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import chain, pairwise
 from typing import Any
 
+from orchestrator.artifacts import Artifacts
 from orchestrator.builders import BLOCK_CODE, BLOCK_SETUP
 from orchestrator.jobs import BlockTask
-from orchestrator.kits import KITS, TEACHING, Illustration
-from orchestrator.methods import (
-    SKILLS,
-    MFStitchConfig,
-    SinglePolicyConfig,
-    first_method,
-    method_name,
-    method_of,
-    method_rollout,
-)
+from orchestrator.methods import SHARED, first_method, method_name, method_of, method_rollout
 from orchestrator.recipes import Recipe, code_fingerprint, digest
 from orchestrator.spec import Spec
-from orchestrator.structure import Plain, to_plain
-from stitching.envs.registry import BENCHMARKS
+from orchestrator.structure import Plain, modules_of, to_plain
+from stitching.methods.protocol import MethodSettings
+from stitching.rollout import RolloutConfig
 
 Prefix = tuple[str, ...]
 
@@ -33,9 +25,36 @@ class Node:
     """One more skill for the episodes that survived a prefix."""
 
     seed: int
-    method: str  # "" for the first skills that methods share
+    method: str  # SHARED for the first skills that methods share
     prefix: Prefix
     parent: Node | None = field(default=None, compare=False, repr=False)
+
+
+@dataclass(frozen=True)
+class Player:
+    """What all blocks of a method have in common."""
+
+    name: str  # of the method without its settings; SHARED likewise
+    settings: MethodSettings
+    rollout: RolloutConfig
+    named: Plain  # what their keys contain of it
+
+    @classmethod
+    def of(cls, spec: Spec, method: str) -> Player:
+        # Planner streams are named by the kind of method, so that settings of one method are
+        # compared under common random numbers.
+        name = method_name(method) if method != SHARED else SHARED
+        settings = spec.method_settings(method)
+        rollout = method_rollout(method, spec.rollout)
+        code = (*BLOCK_CODE, method_of(method).module, *modules_of(settings))
+        named = {
+            "settings": to_plain(settings),
+            "rollout": to_plain(rollout),
+            "code": code_fingerprint(tuple(sorted(set(code))), BLOCK_SETUP),
+        }
+        if "dynamics" in method_of(method).models:
+            named["dynamics"] = to_plain(spec.dynamics)
+        return cls(name, settings, rollout, named)
 
 
 @dataclass(frozen=True)
@@ -44,11 +63,7 @@ class Plan:
 
     spec: Spec
     recipes: dict[str, Recipe]  # by key
-    agents: dict[int, str]  # seed → key
-    dynamics: dict[int, str]
-    mf_policies: dict[tuple[int, str], str]  # (seed, method) → key
-    single_policies: dict[tuple[int, str], str]
-    initiation_sets: dict[int, str]  # seed → key, the same for all: they are of the data alone
+    models: dict[tuple[str, int, str], str]  # (kind, seed, method played with it) → key
     datasets: dict[str, str]  # role → key
     illustrations: dict[str, str]  # name → key
     nodes: tuple[Node, ...]
@@ -56,14 +71,11 @@ class Plan:
     @cached_property
     def scored_kinds(self) -> set[str]:
         """Kinds of the artifacts that scores depend on, which illustrations are not among."""
-        return {self.recipes[key].kind for key in (*self.models, *self.datasets.values())}
+        return {self.recipes[key].kind for key in (*self.models.values(), *self.datasets.values())}
 
-    @property
-    def models(self) -> set[str]:
-        """Keys of all that is trained."""
-        own = {*self.mf_policies.values(), *self.single_policies.values()}
-        for_all = {*self.agents.values(), *self.dynamics.values(), *self.initiation_sets.values()}
-        return for_all | own
+    def by_seed(self, kind: str) -> dict[int, str]:
+        """Keys of the models of a kind that all methods share; empty where none needs them."""
+        return {seed: key for (one, seed, _), key in self.models.items() if one == kind}
 
     @cached_property
     def chunks(self) -> list[tuple[int, int]]:
@@ -91,177 +103,51 @@ class Plan:
     @property
     def needed(self) -> set[str]:
         """Artifacts that the numbers depend on: all but what is only looked at."""
-        inputs = (self.recipes[made].inputs.values() for made in self.models)
-        return self.models.union(*inputs)
+        models = set(self.models.values())
+        return models.union(*(self.recipes[key].inputs.values() for key in models))
 
     def roots(self) -> Iterator[Node]:
         return (node for node in self.nodes if node.parent is None)
 
     @cached_property
-    def _plain(self) -> Plain:
-        """Plain settings by what they are of: a paper's table has a hundred thousand blocks."""
-        methods = {method: self.spec.method_config(method) for method in self.spec.methods}
-        parts = {"dynamics": self.spec.dynamics, **methods}
-        return {name: to_plain(part) for name, part in parts.items()}
-
-    @cached_property
-    def _rollouts(self) -> Plain:
-        """Likewise how skills are executed, by method."""
-        methods = ("", *self.spec.methods)
-        return {method: to_plain(method_rollout(method, self.spec.rollout)) for method in methods}
-
-    def _artifact(self, kind: str, node: Node) -> str:
-        """Key of the artifact of a kind that a node's blocks are played with."""
-        for_all = {
-            "agent": self.agents,
-            "dynamics": self.dynamics,
-            "initiation-sets": self.initiation_sets,
-        }
-        own = {"mf-policy": self.mf_policies, "single-policy": self.single_policies}
-        return for_all[kind][node.seed] if kind in for_all else own[kind][node.seed, node.method]
+    def _players(self) -> dict[str, Player]:
+        """By method: a paper's table has a hundred thousand blocks, and few methods."""
+        return {method: Player.of(self.spec, method) for method in (SHARED, *self.spec.methods)}
 
     def _task(self, node: Node, episodes: tuple[int, int]) -> BlockTask:
-        spec = self.spec
-        artifacts = {kind: self._artifact(kind, node) for kind in method_of(node.method).artifacts}
-        content = {
+        spec, player = self.spec, self._players[node.method]
+        artifacts = {
+            kind: self.models[kind, node.seed, node.method]
+            for kind in method_of(node.method).models
+        }
+        place: dict[str, Any] = {
             "benchmark": spec.benchmark,
             "root_seed": spec.root_seed,
             "seed": node.seed,
-            # Planner streams are named by the kind of method, so that settings of one method are
-            # compared under common random numbers.
-            "method": method_name(node.method) if node.method else "",
-            "stitcher": self._plain[node.method] if node.method else {},
+            "method": player.name,
             "prefix": node.prefix,
             "episodes": episodes,
             "step_limit": spec.step_limit,
-            "rollout": self._rollouts[node.method],
             "artifacts": artifacts,
-            "configs": {kind: self._plain[kind] for kind in artifacts if kind == "dynamics"},
         }
-        key = digest(content | {"code": code_fingerprint(BLOCK_CODE, BLOCK_SETUP)})
-        return BlockTask(key=key, **content)
+        configs = {"dynamics": spec.dynamics} if "dynamics" in artifacts else {}
+        return BlockTask(
+            key=digest(place | player.named),
+            settings=player.settings,
+            rollout=player.rollout,
+            configs=configs,
+            **place,
+        )
 
 
 def make_plan(spec: Spec) -> Plan:
     """Expand a spec. Pure: looks at neither store nor ledger."""
-    recipes: dict[str, Recipe] = {}
-
-    def add(kind: str, params: Plain, inputs: dict[str, str] | None = None) -> str:
-        recipe = Recipe(kind, {"benchmark": spec.benchmark, **params}, inputs or {})
-        recipes[recipe.key] = recipe
-        return recipe.key
-
-    root = {"root_seed": spec.root_seed}
-    kit = KITS[spec.benchmark]
-    settings = to_plain(spec.data)
-    learned_from = {name: x for name, x in settings.items() if name not in kit.for_extras}
-    needed = {kind for method in spec.methods for kind in method_of(method).artifacts}
-    made = kit.datasets(spec.data) if SKILLS in needed else {}
-    datasets = {
-        role: add(one.kind, {"config": learned_from, **root, **one.params})
-        for role, one in made.items()
-    }
-    demonstrations = {role: datasets[role] for role, one in made.items() if one.teaches}
-    seeds = range(spec.seeds if SKILLS in needed else 0)
-    factors = to_plain(BENCHMARKS[spec.benchmark].factors)
-    parts = {"factors": factors} if spec.agent.alters else {}
-    learner = {"config": to_plain(spec.agent), **parts, **root}
-    agents = {seed: add("agent", {**learner, "seed": seed}, demonstrations) for seed in seeds}
-    initiation_sets = {}
-    if "initiation-sets" in needed:
-        key = add("initiation-sets", {"factors": factors}, demonstrations)
-        initiation_sets = dict.fromkeys(seeds, key)
-    dynamics, mf_policies, single_policies, long_horizon = {}, {}, {}, {}
-    for seed in range(spec.seeds):
-        if "dynamics" in needed:
-            params = {"config": to_plain(spec.dynamics), "seed": seed, **root}
-            dynamics[seed] = add("dynamics", params, datasets)
-        for method in spec.methods:
-            config = spec.method_config(method)
-            if isinstance(config, MFStitchConfig):
-                params = {"config": to_plain(config.training), "seed": seed, **root}
-                params["mixture"] = config.mixture
-                start = {"agent": agents[seed]} if config.mixture == "fine-tuned" else {}
-                mf_policies[seed, method] = add("mf-policy", params, demonstrations | start)
-            if isinstance(config, SinglePolicyConfig):
-                shown = {"config": learned_from | {"episodes": config.episodes}, **root}
-                shown |= {"order": config.task.split(">")}
-                key = add(kit.long_horizon(spec.data), shown)
-                long_horizon[f"demonstrations of {method}"] = key
-                params = {"config": to_plain(config.training), "seed": seed, **root}
-                single_policies[seed, method] = add("single-policy", params, {"long-horizon": key})
-    illustrations = {}
-    if any(method_name(method) == "mb-stitch" for method in spec.methods):
-        extras = {
-            role: add(kind, {"config": settings, **root}) for role, kind in kit.extras.items()
-        }
-        there = {"agent": agents[0], "dynamics": dynamics[0], **datasets, **extras}
-        for name, one in kit.illustrations.items():
-            roles = [demonstrations if role == TEACHING else (role,) for role in one.inputs]
-            inputs = {role: there[role] for role in chain.from_iterable(roles)}
-            illustrations[name] = add(one.kind, _illustrated(spec, one), inputs)
+    made = Artifacts(spec)
+    made.add_models()
+    made.add_illustrations()
     return Plan(
-        spec,
-        recipes,
-        agents,
-        dynamics,
-        mf_policies,
-        single_policies,
-        initiation_sets,
-        datasets | long_horizon,
-        illustrations,
-        tuple(_nodes(spec)),
+        spec, made.recipes, made.models, made.datasets, made.illustrations, tuple(_nodes(spec))
     )
-
-
-def _illustrated(spec: Spec, illustration: Illustration) -> Plain:
-    """Parameters of an illustration; one that plays a task does so by No- and MB-Stitch.
-
-    Of several MB-Stitches, the first. One that takes stitches apart knows what No-Stitch is.
-    """
-    params: Plain = {
-        "configs": {"dynamics": to_plain(spec.dynamics)},
-        "rollout": to_plain(spec.rollout),
-        "step_limit": spec.step_limit,
-        "root_seed": spec.root_seed,
-        "seed": 0,
-    }
-    ours = _settings(spec, "mb-stitch")[:1]
-    if illustration.pairs:
-        return params | {
-            "methods": ours,
-            "pairs": _spread_out(_neighbours(spec), illustration.pairs),
-            "episodes": min(illustration.episodes, spec.episodes),
-        }
-    task = illustration.task
-    if not task:
-        return params | {"horizon": spec.mb_stitch.chosen.horizon}
-    return params | {
-        # Whatever their order in the spec.
-        "methods": _settings(spec, "no-stitch") + ours,
-        "task": task if task in spec.all_tasks else max(spec.all_tasks, key=len),
-    }
-
-
-def _settings(spec: Spec, kind: str) -> list[list[Any]]:
-    """The spec's methods of a kind, each with its settings."""
-    return [
-        [method, to_plain(spec.method_config(method))]
-        for method in spec.methods
-        if method_name(method) == kind
-    ]
-
-
-def _neighbours(spec: Spec) -> list[Prefix]:
-    """Skills that follow one another in some task, each pair once."""
-    return list(dict.fromkeys(pair for task in spec.all_tasks for pair in pairwise(task)))
-
-
-def _spread_out(pairs: list[Prefix], most: int) -> list[Prefix]:
-    """At most so many, at equal distances, with the first and the last."""
-    if len(pairs) <= most:
-        return pairs
-    return [pairs[round(i * (len(pairs) - 1) / max(1, most - 1))] for i in range(most)]
 
 
 def _nodes(spec: Spec) -> list[Node]:

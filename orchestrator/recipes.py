@@ -7,6 +7,7 @@ import hashlib
 import importlib.metadata
 import importlib.util
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -53,25 +54,42 @@ class Recipe:
 
 @cache
 def code_fingerprint(modules: tuple[str, ...], beside: tuple[str, ...] = ()) -> str:
-    """Hash of the syntax trees of some modules and of every `stitching` module that they need.
+    """Hash of the syntax trees of some modules and of what they need of `stitching`.
 
-    Modules named `beside` are added without what they import. Comments, docstrings and formatting
-    do not matter; any other change does, and so do the versions of the numeric packages. So an edit
-    to a planner retrains nothing, and an edit to IQL retrains exactly what IQL made.
+    Where a module is another package's, of what they need of that, too. Modules named `beside` are
+    added without what they import. Comments, docstrings and formatting do not matter; any other
+    change does, and so do the versions of the numeric packages and of packages that bring modules.
+    So an edit to a planner retrains nothing, and an edit to IQL retrains exactly what IQL made.
     """
     trees = {name: _syntax(_tree(name)) for name in sorted(_closure(modules) | set(beside))}
-    packages = {name: importlib.metadata.version(name) for name in NUMERIC_PACKAGES}
-    return digest({"modules": trees, "packages": packages})
+    versions = {name: importlib.metadata.version(name) for name in NUMERIC_PACKAGES}
+    return digest({"modules": trees, "packages": versions | _versions(_packages(modules))})
+
+
+def _packages(modules: Iterable[str]) -> set[str]:
+    """The top-level packages that bring some modules."""
+    return {module.partition(".")[0] for module in modules}
+
+
+def _versions(packages: set[str]) -> dict[str, str]:
+    """Versions of the distributions of packages that are not ours."""
+    others = packages - {METHOD_PACKAGE}
+    if not others:
+        return {}
+    brought_by = importlib.metadata.packages_distributions()
+    names = {name for package in others for name in brought_by.get(package, [])}
+    return {name: importlib.metadata.version(name) for name in sorted(names)}
 
 
 def _closure(modules: tuple[str, ...]) -> set[str]:
+    packages = frozenset({METHOD_PACKAGE} | _packages(modules))
     seen: set[str] = set()
     waiting = list(modules)
     while waiting:
         name = waiting.pop()
         if name not in seen:
             seen.add(name)
-            waiting.extend(_imports(name))
+            waiting.extend(_imports(name, packages))
     return seen
 
 
@@ -83,15 +101,15 @@ def _tree(module: str) -> ast.Module:
     return ast.parse(Path(spec.origin).read_text())
 
 
-def _imports(module: str) -> set[str]:
-    """Modules of the method's package that a module imports, in any form and anywhere in it."""
+def _imports(module: str, packages: frozenset[str]) -> set[str]:
+    """Modules of the packages that a module imports, in any form and anywhere in it."""
     named: set[str] = set()
     for node in ast.walk(_tree(module)):
         if isinstance(node, ast.Import):
             named |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module is not None:
             named |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
-    own = {name for name in named if name.startswith(f"{METHOD_PACKAGE}.")}
+    own = {name for name in named if "." in name and name.partition(".")[0] in packages}
     return {name for name in own if _is_module(name)}
 
 

@@ -15,7 +15,7 @@ from orchestrator import locking
 from orchestrator.errors import ChangedError, UsageError
 from orchestrator.kits import KITS
 from orchestrator.ledger import Ledger
-from orchestrator.methods import first_method, method_label
+from orchestrator.methods import first_method, method_label, method_of
 from orchestrator.plan import make_plan
 from orchestrator.provenance import matters
 from orchestrator.spec import Spec, TableSpec, differences, spec_from_plain
@@ -166,6 +166,7 @@ def describe(spec: Spec) -> Plain:
                 "name": method,
                 "label": method_label(method),
                 "own_first_skill": bool(first_method(method, spec.rollout)),
+                "models": list(method_of(method).models),
             }
             for method in spec.methods
         ],

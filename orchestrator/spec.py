@@ -4,36 +4,28 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from importlib import resources
 from itertools import permutations
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import tyro
 
 from analysis.rows import ROW_RULES
 from orchestrator.errors import UsageError
 from orchestrator.kits import KITS, DataConfig
-from orchestrator.methods import (
-    METHODS,
-    MBStitchConfig,
-    MethodConfig,
-    MFStitchConfig,
-    PlanningConfig,
-    RandomStitchConfig,
-    ReachStitchConfig,
-    SinglePolicyConfig,
-    check_start,
-    method_name,
-    parse_method,
-)
+from orchestrator.methods import SHARED, method_name, method_of, parse_method
 from orchestrator.structure import Plain, merged, nested, settings_of, structure, to_plain
 from orchestrator.tomls import Scale, based_fields, read_toml, toml_names
 from stitching.bounds import Bounded, Count, Episodes, Few, Seed
 from stitching.envs.registry import BENCHMARKS
+from stitching.methods.no_stitch import NO_STITCH
+from stitching.methods.protocol import MethodSettings
+from stitching.methods.registry import METHODS
 from stitching.models.dynamics import DynamicsConfig
 from stitching.models.iql import IQLConfig
+from stitching.registry import field_name, sections
 from stitching.rollout import RolloutConfig
 
 NAME = re.compile(r"[A-Za-z0-9][\w.-]*")  # becomes part of paths
@@ -51,9 +43,24 @@ class TableSpec:
     baseline: str = ""  # gains of all others over this method; default: of the last over all others
 
 
-@dataclass(frozen=True)
-class Spec(Bounded):
-    """A reproduction: tasks × methods × seeds × episodes of one benchmark, and its tables."""
+if TYPE_CHECKING:
+
+    class MethodSections(Bounded):
+        """A field for the settings of each method: `mb_stitch`, `reach_stitch`."""
+
+        def __getattr__(self, name: str) -> Any: ...
+
+else:
+    with_settings = {name: one.settings for name, one in METHODS.items() if fields(one.settings)}
+    MethodSections = sections("MethodSections", with_settings)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spec(MethodSections):
+    """A reproduction: tasks × methods × seeds × episodes of one benchmark, and its tables.
+
+    Beside the fields below it has one for the settings of each registered method.
+    """
 
     name: str
     title: str
@@ -71,11 +78,6 @@ class Spec(Bounded):
     rollout: RolloutConfig = RolloutConfig()
     agent: IQLConfig = IQLConfig()
     dynamics: DynamicsConfig = DynamicsConfig()
-    random_stitch: RandomStitchConfig = RandomStitchConfig()
-    mf_stitch: MFStitchConfig = MFStitchConfig()
-    mb_stitch: MBStitchConfig = MBStitchConfig()
-    reach_stitch: ReachStitchConfig = ReachStitchConfig()
-    single_policy: SinglePolicyConfig = SinglePolicyConfig()
     tables: tuple[TableSpec, ...] = ()
 
     def __post_init__(self) -> None:
@@ -109,22 +111,17 @@ class Spec(Bounded):
         """Episodes are played to the longest limit of their benchmark and cut afterwards."""
         return max(self.step_limits.values())
 
-    def method_config(self, method: str) -> MethodConfig:
-        """The configuration of `name` or `name[field=value,…]`; UsageError lists what is valid.
+    def method_settings(self, method: str) -> MethodSettings:
+        """The settings of `name` or `name[field=value,…]`; UsageError lists what is valid.
 
         Fields of fields are joined by dots: mb-stitch[alpha=5,cem.horizon=3].
         """
+        if method == SHARED:
+            return NO_STITCH.settings()
         name, overrides = parse_method(method)
-        settings: dict[str, Plain] = {
-            "no-stitch": {},
-            "random-stitch": to_plain(self.random_stitch),
-            "mf-stitch": to_plain(self.mf_stitch),
-            "mb-stitch": to_plain(self.mb_stitch),
-            "reach-stitch": to_plain(self.reach_stitch),
-            "single-policy": to_plain(self.single_policy),
-        }
-        config = merged(settings[name], nested(overrides))
-        return structure(METHODS[name].config, config, f"spec {self.name}, method {method}")
+        section = getattr(self, field_name(name), METHODS[name].settings())
+        settings = merged(to_plain(section), nested(overrides))
+        return structure(METHODS[name].settings, settings, f"spec {self.name}, method {method}")
 
 
 def check_spec(spec: Spec) -> None:
@@ -185,34 +182,18 @@ def _check_methods(spec: Spec, where: str) -> None:
         raise UsageError(f"{where}: no methods; there are {', '.join(METHODS)}")
     seen: dict[tuple[str, str], str] = {}
     for method in spec.methods:
-        config = spec.method_config(method)
-        same = seen.setdefault((method_name(method), str(config)), method)
+        settings = spec.method_settings(method)
+        same = seen.setdefault((method_name(method), str(settings)), method)
         if same != method or spec.methods.count(method) > 1:
             raise UsageError(f"{where}, methods: {same} and {method} are the same method")
-        if isinstance(config, MFStitchConfig):
-            check_start(config, spec.agent, f"{where}, {method}")
-        if isinstance(config, SinglePolicyConfig):
-            _check_demonstrated(spec, config, f"{where}, {method}")
-        discrete = BENCHMARKS[spec.benchmark].actions.discrete
-        if isinstance(config, PlanningConfig) and config.planner == "cem" and discrete:
-            raise UsageError(
-                f"{where}, {method}: cem plans continuous actions, {spec.benchmark} has discrete "
-                "ones; set planner to random-shooting"
-            )
+        if "single-policy" in method_of(method).models:
+            _check_demonstrated(spec, f"{where}, {method}")
+        with settings_of(f"{where}, {method}"):
+            settings.check(BENCHMARKS[spec.benchmark], spec.agent)
 
 
 def _check_altered_data(spec: Spec, where: str) -> None:
     """What `swap` and `corrections` need: rows of one skill each, the robot and objects apart."""
-    learners: dict[str, MethodConfig] = {
-        "mf_stitch": spec.mf_stitch,
-        "single_policy": spec.single_policy,
-        **{method: spec.method_config(method) for method in spec.methods},
-    }
-    for name, config in learners.items():
-        if isinstance(config, MFStitchConfig | SinglePolicyConfig) and config.training.alters:
-            raise UsageError(
-                f"{where}, {name}, training: only the agent learns with swap and corrections"
-            )
     if not spec.agent.alters:
         return
     if not BENCHMARKS[spec.benchmark].factors.objects:
@@ -224,16 +205,10 @@ def _check_altered_data(spec: Spec, where: str) -> None:
         raise UsageError(f"{where}, agent: swap and corrections need agent.multi_task")
 
 
-def _check_demonstrated(spec: Spec, config: SinglePolicyConfig, where: str) -> None:
-    """Whether there can be demonstrations of the one task that a policy is to learn."""
+def _check_demonstrated(spec: Spec, where: str) -> None:
+    """Whether there can be demonstrations of a long task that nobody cut."""
     if not KITS[spec.benchmark].long_horizon(spec.data):
         raise UsageError(f"{where}: these data of {spec.benchmark} demonstrate no long task")
-    skills = config.task.split(">")
-    if not set(skills) <= set(spec.skill_names) or len(set(skills)) < len(skills):
-        raise UsageError(
-            f"{where}, task: {config.task!r} is no task; join skills by '>', each once, of "
-            f"{', '.join(spec.skill_names)}"
-        )
 
 
 PACKAGED = resources.files("orchestrator.specs")

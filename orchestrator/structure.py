@@ -19,8 +19,11 @@ def structure(cls: type[T], plain: Any, where: str) -> T:
     if not isinstance(plain, dict):
         raise UsageError(f"{where}: expected a table of fields, got {plain!r}")
     known = {field.name: field for field in fields(cls)}  # type: ignore[arg-type]
+    hints = get_type_hints(cls)
     if unknown := [key for key in plain if key not in known]:
-        raise UsageError(f"{where}: unknown field {unknown[0]!r}; valid are {', '.join(known)}")
+        tables_last = sorted(known, key=lambda name: is_dataclass(hints[name]))
+        valid = ", ".join(tables_last)
+        raise UsageError(f"{where}: unknown field {unknown[0]!r}; valid are {valid}")
     missing = [
         name
         for name, field in known.items()
@@ -28,7 +31,6 @@ def structure(cls: type[T], plain: Any, where: str) -> T:
     ]
     if missing:
         raise UsageError(f"{where}: field {missing[0]!r} is missing")
-    hints = get_type_hints(cls)
     values = {name: _value(hints[name], value, f"{where}, {name}") for name, value in plain.items()}
     with settings_of(where):
         return cls(**values)
@@ -100,6 +102,13 @@ def to_plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [to_plain(item) for item in value]
     return value
+
+
+def modules_of(settings: Any) -> set[str]:
+    """The modules of a dataclass of settings and of those within it."""
+    parts = (getattr(settings, field.name) for field in fields(settings))
+    within = (modules_of(part) for part in parts if is_dataclass(part))
+    return {type(settings).__module__}.union(*within)
 
 
 def merged(base: Plain, overlay: Plain) -> Plain:

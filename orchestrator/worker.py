@@ -11,18 +11,19 @@ import numpy as np
 import torch
 
 from orchestrator.builders import BUILDERS
-from orchestrator.builders.models import load_models
+from orchestrator.builders.models import LOADERS
 from orchestrator.builders.parts import Inputs
 from orchestrator.jobs import BlockReport, BlockTask, BuildJob, PlayJob, Report
 from orchestrator.ledger import Outcome
-from orchestrator.methods import make_stitcher, method_block, method_of
+from orchestrator.methods import method_block, method_of
 from orchestrator.store import Artifact
-from orchestrator.structure import structure
 from stitching.data.transitions import DataError
 from stitching.envs.protocol import EpisodeBlock
 from stitching.envs.registry import BENCHMARKS
+from stitching.methods.protocol import Models
+from stitching.models.agent import Agent
 from stitching.models.checkpoints import checkpoints_in
-from stitching.rollout import Play, RolloutConfig, begin, play_segment
+from stitching.rollout import Play, begin, play_segment
 
 
 def use_one_thread() -> None:
@@ -68,18 +69,19 @@ class BlockPlayer:
         self, task: BlockTask, parent: Outcome | None, artifacts: Mapping[str, Artifact]
     ) -> Outcome:
         benchmark = BENCHMARKS[task.benchmark]
-        models = {kind: self._model(task, kind, artifacts) for kind in task.artifacts}
-        agent = models[method_of(task.method).policy]
-        stitcher = make_stitcher(task.method, task.stitcher, benchmark, agent, models)
+        method = method_of(task.method)
+        trained = {kind: self._model(task, kind, artifacts) for kind in task.artifacts}
+        models = Models(benchmark.actions, len(benchmark.skills), trained)
+        agent = models.one(method.policy, Agent)
+        stitcher = method.stitcher(task.settings, models)
         episodes, used, snapshots = survivors(task, parent)
         play = Play(
             task.root_seed, task.benchmark, task.seed, task.method, tuple(episodes), task.prefix
         )
         block = self._block(task)
         begin(block, play, snapshots)
-        config = structure(RolloutConfig, task.rollout, "rollout")
         segments = play_segment(
-            block, agent, stitcher, benchmark, config, play, task.step_limit - used
+            block, agent, stitcher, benchmark, task.rollout, play, task.step_limit - used
         )
         return Outcome(
             {
@@ -103,8 +105,8 @@ class BlockPlayer:
     def _model(self, task: BlockTask, kind: str, artifacts: Mapping[str, Artifact]) -> Any:
         key = task.artifacts[kind]
         if (kind, key) not in self._models:
-            loaded = load_models(BENCHMARKS[task.benchmark], task.configs, {kind: artifacts[key]})
-            self._models[kind, key] = loaded[kind]
+            benchmark = BENCHMARKS[task.benchmark]
+            self._models[kind, key] = LOADERS[kind](artifacts[key], benchmark, task.configs)
         return self._models[kind, key]
 
 

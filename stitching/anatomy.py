@@ -8,7 +8,7 @@ Algorithm 1 stitches before a task's first skill, too, each of these is played t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import compress
 from typing import Any, ClassVar
@@ -18,12 +18,14 @@ import torch
 from torch import Tensor
 
 from stitching.data.transitions import Transitions
-from stitching.envs.protocol import ActionSpace, Benchmark, EpisodeBlock
+from stitching.envs.protocol import Benchmark, EpisodeBlock
+from stitching.methods.mb_stitch import MBStitch
+from stitching.methods.no_stitch import NoStitch
+from stitching.methods.protocol import Proposal, Stitcher
 from stitching.models.agent import Agent
 from stitching.planning.objective import NORMS, spread_over_members
-from stitching.planning.protocol import Plan, Planner, Score
+from stitching.planning.protocol import Plan
 from stitching.rollout import Play, Recorder, RolloutConfig, Segments, begin, play_segment
-from stitching.stitchers import MBStitch, NoStitch, Proposal, Stitcher
 from stitching.surroundings import Surroundings
 
 DIGITS = 5  # after the point, of what is recorded
@@ -79,20 +81,6 @@ class Subject:
 
 
 @dataclass
-class Remembering:
-    """A planner that keeps the plan it made last."""
-
-    planner: Planner
-    last: Plan | None = None
-
-    def plan(
-        self, score: Score, streams: Sequence[np.random.Generator], actions: ActionSpace
-    ) -> Plan:
-        self.last = self.planner.plan(score, streams, actions)
-        return self.last
-
-
-@dataclass
 class Trace:
     """One stitch of n steps and its plans; `as_plain` is what figures read."""
 
@@ -112,8 +100,7 @@ class Witness:
     """
 
     def __init__(self, subject: Subject, near: Surroundings) -> None:
-        self._planner = Remembering(subject.stitcher.planner)
-        self._stitcher = replace(subject.stitcher, planner=self._planner)
+        self._stitcher = subject.stitcher
         self._agent, self._near = subject.agent, near
         self._expected: list[Numbers] = []  # of plans whose first action is still to be taken
         self.traces: dict[int, Trace] = {}  # by episode
@@ -132,9 +119,9 @@ class Witness:
         following: int,
         streams: Sequence[np.random.Generator],
     ) -> Proposal:
-        proposal = self._stitcher.propose(states, previous, following, streams)
-        assert self._planner.last is not None
-        expected = self.foresee(states, following, self._planner.last)
+        plan = self._stitcher.plan(states, following, streams)
+        proposal = self._stitcher.proposal(plan, states, following)
+        expected = self.foresee(states, following, plan)
         self._expected = list(compress(expected, proposal.wanted))
         return proposal
 
@@ -210,8 +197,8 @@ def anatomy(
     return {
         "episodes": episodes,
         "limit": subject.stitcher.limit,
-        "alpha": subject.stitcher.alpha,
-        "beta": subject.stitcher.beta,
+        "alpha": subject.stitcher.settings.alpha,
+        "beta": subject.stitcher.settings.beta,
         "typical_distance": {
             skill: None if distance is None else round(distance, DIGITS)
             for skill, distance in typical.items()

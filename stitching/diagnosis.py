@@ -17,11 +17,11 @@ from scipy.stats import spearmanr
 
 from stitching.data.transitions import Transitions
 from stitching.envs.protocol import Benchmark
+from stitching.methods.no_stitch import NoStitch
 from stitching.models.agent import Agent
 from stitching.models.dynamics import Dynamics
 from stitching.planning.objective import NORMS, spread_over_members
 from stitching.rollout import Play, RolloutConfig, play_segment
-from stitching.stitchers import NoStitch
 
 MOST_TRIALS = 100  # of each skill's policy
 SHOWN_POINTS = 500  # of disagreement against error

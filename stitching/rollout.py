@@ -11,10 +11,10 @@ import numpy as np
 import torch
 
 from stitching.bounds import Amount, Bounded, NotNegative
-from stitching.envs.protocol import Benchmark, EpisodeBlock
+from stitching.envs.protocol import ActionSpace, Benchmark, EpisodeBlock
+from stitching.methods.protocol import Stitcher
 from stitching.models.agent import Agent
 from stitching.planning.objective import spread_over_members
-from stitching.stitchers import Stitcher, policy_noise
 from stitching.streams import stream
 
 
@@ -193,6 +193,13 @@ def _execute(
         actions = agent.act(states, progress.skill, noise, config.temperature)
         progress.step(rows, actions, "execute")
         rows = progress.open(rows)
+
+
+def policy_noise(actions: ActionSpace, streams: Sequence[np.random.Generator]) -> np.ndarray:
+    """One step's sampling noise from each stream: (n, 1) uniform, or (n, action) normal."""
+    if actions.discrete:
+        return np.array([[rng.random()] for rng in streams], dtype=np.float32)
+    return np.stack([rng.standard_normal(actions.size, dtype=np.float32) for rng in streams])
 
 
 def _value(

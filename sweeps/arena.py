@@ -174,7 +174,6 @@ def only_seeds(plan: Plan, seeds: tuple[int, ...]) -> Plan:
     """The part of a plan that some seeds take."""
     return replace(
         plan,
-        agents={seed: plan.agents[seed] for seed in seeds},
-        dynamics={seed: key for seed, key in plan.dynamics.items() if seed in seeds},
+        models={place: key for place, key in plan.models.items() if place[1] in seeds},
         nodes=tuple(node for node in plan.nodes if node.seed in seeds),
     )

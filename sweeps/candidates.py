@@ -57,15 +57,15 @@ def _once(methods: dict[str, None], spec: Spec) -> list[str]:
     """Methods that say the same in other words (1 and 1.0), once."""
     kept: dict[str, str] = {}
     for method in methods:
-        kept.setdefault(repr(spec.method_config(method)), method)
+        kept.setdefault(repr(spec.method_settings(method)), method)
     return list(kept.values())
 
 
 def _renamed(group: Group) -> Group:
     """Every candidate under the one name that its method was kept by."""
-    kept = {repr(group.spec.method_config(method)): method for method in group.spec.methods}
+    kept = {repr(group.spec.method_settings(method)): method for method in group.spec.methods}
     methods = {
-        place: kept[repr(group.spec.method_config(method))]
+        place: kept[repr(group.spec.method_settings(method))]
         for place, method in group.methods.items()
     }
     return replace(group, methods=methods)

@@ -17,9 +17,10 @@ import numpy as np
 import pandas as pd
 
 from analysis.statistics import Gain, generator, paired_differences, paired_gain
-from orchestrator.methods import MBStitchConfig, first_method
+from orchestrator.methods import first_method
 from orchestrator.spec import Spec
 from orchestrator.structure import Plain
+from stitching.methods.mb_stitch import MBStitchSettings
 from sweeps.arena import Arena, Played
 from sweeps.candidates import NO_STITCH, group
 from sweeps.space import Fields
@@ -30,7 +31,7 @@ class Showing:
     """How one candidate did beside No-Stitch under the base's models."""
 
     method: str
-    config: MBStitchConfig
+    settings: MBStitchSettings
     segments: pd.DataFrame  # its own: of first skills only those that it stitches to
     episodes: pd.DataFrame
     baseline: pd.DataFrame  # No-Stitch's episodes
@@ -64,19 +65,16 @@ class Showing:
     def imagined(self) -> float:
         """Model steps that planning one stitch takes, at most.
 
-        plans · population · horizon · iterations, with one plan for every `execute` steps of the
-        stitch. It is an upper bound where CEM converges early, but, unlike seconds, the same on
-        any machine and for any number of workers.
+        plans · samples · horizon, with one plan for every `execute` steps of the stitch. It is an
+        upper bound where CEM converges early, but, unlike seconds, the same on any machine and for
+        any number of workers.
         """
         if self.segments.empty:
             return 0.0
-        config = self.config
-        plans = np.ceil(self.segments["stitch_steps"].to_numpy() / config.execute).mean()
-        if config.planner == "cem":
-            steps = config.cem.population * config.cem.iterations
-        else:
-            steps = config.random_shooting.population
-        return float(plans * steps * config.chosen.horizon)
+        stitch_steps = self.segments["stitch_steps"].to_numpy()
+        plans = np.ceil(stitch_steps / self.settings.execute).mean()
+        planner = self.settings.chosen
+        return float(plans * planner.samples * planner.horizon)
 
     def instances(self, places: dict[tuple[str, int], int]) -> dict[int, float]:
         """Place of a (task, episode) → its paired gain over No-Stitch, mean over seeds.
@@ -128,11 +126,11 @@ def pareto_front(trials: Sequence[Plain]) -> list[Plain]:
 
 
 def _showing(played: Played, spec: Spec, method: str, baseline: pd.DataFrame) -> Showing:
-    config = spec.method_config(method)
-    assert isinstance(config, MBStitchConfig)
+    settings = spec.method_settings(method)
+    assert isinstance(settings, MBStitchSettings)
     return Showing(
         method,
-        config,
+        settings,
         _of(played.segments, method),
         _of(played.episodes, method),
         baseline,

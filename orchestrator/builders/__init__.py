@@ -1,13 +1,12 @@
 """How each kind of artifact is made, and whose code decides what is in it."""
 
-from orchestrator.builders.anatomy import ANATOMY_BUILDERS
 from orchestrator.builders.kitchen import KITCHEN_BUILDERS
 from orchestrator.builders.long_horizon import LONG_HORIZON_BUILDERS
 from orchestrator.builders.maze import MAZE_BUILDERS
-from orchestrator.builders.parts import PLANNERS, Builder
+from orchestrator.builders.parts import Builder
 from orchestrator.builders.robosuite import ROBOSUITE_BUILDERS
+from orchestrator.builders.studies import STUDY_BUILDERS
 from orchestrator.builders.training import TRAINING_BUILDERS
-from orchestrator.methods import METHODS
 
 BUILDERS: dict[str, Builder] = (
     TRAINING_BUILDERS
@@ -15,12 +14,10 @@ BUILDERS: dict[str, Builder] = (
     | KITCHEN_BUILDERS
     | LONG_HORIZON_BUILDERS
     | ROBOSUITE_BUILDERS
-    | ANATOMY_BUILDERS
+    | STUDY_BUILDERS
 )
 
-# What decides a block's outcome beside the models: Algorithm 1, every registered stitcher, the
-# planners, what counts,
-STITCHERS = tuple(sorted({method.stitcher.__module__ for method in METHODS.values()}))
-BLOCK_CODE = ("stitching.rollout", "stitching.envs.first_times", *STITCHERS, *PLANNERS)
+# What decides a block's outcome beside its method and the models: Algorithm 1, what counts,
+BLOCK_CODE = ("stitching.rollout", "stitching.envs.first_times")
 # and how they are set up, without the method's code that these import for other purposes.
 BLOCK_SETUP = ("orchestrator.builders.models", "orchestrator.methods", "orchestrator.worker")

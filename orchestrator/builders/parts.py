@@ -13,14 +13,6 @@ from stitching.data.transitions import Transitions
 
 Inputs = Mapping[str, Artifact]  # by role
 
-# Modules whose code decides: the planners', and what sets up a picture or a judgement of models.
-PLANNERS = ("stitching.planning.cem", "stitching.planning.random_shooting")
-LOOKING = (
-    "orchestrator.builders.illustrations",
-    "orchestrator.builders.models",
-    "orchestrator.methods",
-)
-
 
 @dataclass(frozen=True)
 class Builder:

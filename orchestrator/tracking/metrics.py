@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,14 +16,6 @@ if TYPE_CHECKING:
     from analysis.run import RunSpec, TableEntry
 
 Curves = dict[str, list[tuple[int, float]]]
-
-ARTIFACTS = {
-    "mb-stitch": {"agent", "dynamics"},
-    "mf-stitch": {"agent", "mf-policy"},
-    "reach-stitch": {"agent", "dynamics", "initiation-sets"},
-    "single-policy": {"single-policy"},
-}
-"""What a method is played with, where that is not just the skills' agent."""
 
 
 def reported(report: Path, table: str) -> dict[str, float]:
@@ -66,10 +58,10 @@ def seed_scores(episodes: pd.DataFrame, spec: RunSpec, entry: TableEntry) -> dic
     return metrics
 
 
-def learning_curves(method: str, seed: int, training: list[dict[str, Any]]) -> Curves:
-    """Learning curves of the artifacts that this method uses under this seed."""
-    own = [used for name, used in ARTIFACTS.items() if method.startswith(name)]
-    kinds = set().union(*own) or {"agent"}
+def learning_curves(
+    method: str, kinds: Collection[str], seed: int, training: list[dict[str, Any]]
+) -> Curves:
+    """Learning curves of the models, by kind, that a method is played with under this seed."""
     variant = method.partition(VARIANT)[2]
     used = [
         entry

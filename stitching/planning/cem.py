@@ -65,11 +65,18 @@ class CEM(Bounded):
                 f"elites: must be at most the population, {self.population}: {self.elites}"
             )
 
+    @property
+    def samples(self) -> int:
+        return self.population * self.iterations
+
+    def can_search(self, actions: ActionSpace) -> bool:
+        return not actions.discrete  # it samples Gaussians
+
     @torch.no_grad()
     def plan(
         self, score: Score, streams: Sequence[np.random.Generator], actions: ActionSpace
     ) -> Plan:
-        if actions.discrete:
+        if not self.can_search(actions):
             raise ValueError("CEM samples Gaussians: use RandomShooting for discrete actions")
         problems = torch.arange(len(streams))
         mean = torch.zeros(len(streams), self.horizon, actions.size)

@@ -34,9 +34,23 @@ class Plan:
 class Planner(Protocol):
     """Searches for the action sequence with the highest score.
 
-    A planner is settings and nothing else, so that a spec can hold one: what it plans for arrives
-    with each call.
+    A planner is settings and nothing else, a frozen dataclass, so that a spec can hold one: what it
+    plans for arrives with each call. PLANNERS (stitching.planning.registry) has them by name.
     """
+
+    @property
+    def horizon(self) -> int:
+        """Actions in each sequence."""
+        ...
+
+    @property
+    def samples(self) -> int:
+        """The most action sequences that one plan takes."""
+        ...
+
+    def can_search(self, actions: ActionSpace) -> bool:
+        """Whether it can plan actions of this kind."""
+        ...
 
     def plan(
         self, score: Score, streams: Sequence[np.random.Generator], actions: ActionSpace

@@ -20,6 +20,13 @@ class RandomShooting(Bounded):
     population: Count = 200  # action sequences drawn a problem
     horizon: Few = 5  # actions in each sequence
 
+    @property
+    def samples(self) -> int:
+        return self.population
+
+    def can_search(self, actions: ActionSpace) -> bool:
+        return True
+
     @torch.no_grad()
     def plan(
         self, score: Score, streams: Sequence[np.random.Generator], actions: ActionSpace

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from stitching.envs.protocol import Benchmark
+from stitching.methods.protocol import Stitcher
 from stitching.models.agent import Agent
 from stitching.rollout import Play, Recorder, RolloutConfig, Segments, play_from_start
-from stitching.stitchers import Stitcher
 
 
 @dataclass(frozen=True)

@@ -37,18 +37,16 @@ import torch
 from torch import Tensor
 
 from orchestrator.builders.models import load_models
-from orchestrator.methods import MBStitchConfig, make_stitcher
 from orchestrator.rundir import RunDirectory
 from orchestrator.spec import Spec, load_spec
 from orchestrator.store import Arrays, Artifact, Store
-from orchestrator.structure import to_plain
 from stitching.data.transitions import Transitions, concatenate
 from stitching.envs.kitchen import KITCHEN
+from stitching.methods.mb_stitch import MBStitch, MBStitchSettings
 from stitching.models.dynamics import DynamicsConfig
 from stitching.models.layers import init_mlp, prefixed
 from stitching.planning.cem import CEM
 from stitching.planning.protocol import Score
-from stitching.stitchers import MBStitch
 from stitching.streams import stream
 from tests.bench.result import Result
 
@@ -294,13 +292,10 @@ def _setting(run: Path | None) -> Setting:
 
 
 def _stitcher(
-    models: dict[str, Arrays], config: DynamicsConfig, settings: MBStitchConfig
+    models: dict[str, Arrays], config: DynamicsConfig, settings: MBStitchSettings
 ) -> MBStitch:
     artifacts = {kind: Artifact(arrays, {}) for kind, arrays in models.items()}
-    ready = load_models(KITCHEN, {"dynamics": to_plain(config)}, artifacts)
-    stitcher = make_stitcher("mb-stitch", to_plain(settings), KITCHEN, ready["agent"], ready)
-    assert isinstance(stitcher, MBStitch)
-    return stitcher
+    return MBStitch(settings, load_models(KITCHEN, {"dynamics": config}, artifacts))
 
 
 def _of_run(run: Path) -> tuple[dict[str, Arrays], DynamicsConfig, Transitions]:

@@ -411,7 +411,7 @@ def test_gc(cli: Cli, done: Place, plan: Plan, expected: dict[str, bytes], spec:
             shared.close()
 
     wanted, unwanted = (
-        done.store.checkpoints(key) for key in (plan.agents[0], "of-no-run-that-is-kept")
+        done.store.checkpoints(key) for key in (plan.by_seed("agent")[0], "of-no-run-that-is-kept")
     )
     for folder in (wanted, unwanted):
         folder.mkdir()

@@ -8,7 +8,6 @@ from itertools import pairwise, permutations
 import pandas as pd
 import pytest
 
-from orchestrator.methods import SinglePolicyConfig
 from orchestrator.plan import Plan, make_plan
 from orchestrator.printing import forecast_lines
 from orchestrator.spec import Spec, load_spec
@@ -16,6 +15,7 @@ from orchestrator.store import Store
 from stitching.anatomy import START
 from stitching.data.kitchen.demonstrations import KitchenDataConfig
 from stitching.data.kitchen.segments import Order
+from stitching.methods.single_policy import SinglePolicySettings
 from stitching.models.dynamics import DynamicsConfig
 from stitching.models.iql import IQLConfig
 from stitching.planning.cem import CEM
@@ -48,7 +48,7 @@ def spec() -> Spec:
         dynamics=DynamicsConfig(updates=300, width=32, members=2, activation="elu"),
         random_stitch=replace(spec.random_stitch, limit=3),
         mf_stitch=replace(spec.mf_stitch, limit=3, training=replace(skills, updates=100)),
-        single_policy=SinglePolicyConfig(">".join(ORDER), episodes=12, training=skills),
+        single_policy=SinglePolicySettings(">".join(ORDER), episodes=12, training=skills),
         mb_stitch=replace(spec.mb_stitch, limit=3, cem=CEM(population=16, elites=4, iterations=10)),
     )
 

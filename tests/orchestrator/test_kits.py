@@ -52,8 +52,8 @@ def test_table2_is_the_papers_protocol() -> None:
 def test_kitchen_data_are_collected_an_order_at_a_time(spec: Spec) -> None:
     plan = make_plan(replace(spec, data=replace(spec.data, first_weights={})))
     assert len(plan.datasets) == 24
-    agent = plan.recipes[plan.agents[0]]
-    assert agent.inputs == plan.datasets == plan.recipes[plan.dynamics[0]].inputs
+    agent = plan.recipes[plan.by_seed("agent")[0]]
+    assert agent.inputs == plan.datasets == plan.recipes[plan.by_seed("dynamics")[0]].inputs
     orders = [tuple(plan.recipes[key].params["order"]) for key in plan.datasets.values()]
     assert len(set(orders)) == 24
 
@@ -82,7 +82,7 @@ def test_stitches_are_taken_apart_between_pairs_from_all_over_the_tasks(plan: Pl
     assert len(set(pairs)) == len(pairs) == 20
     assert {first for first, _ in pairs} == {second for _, second in pairs} == set(SKILLS)
     assert [method for method, _ in recipe.params["methods"]] == ["mb-stitch"]
-    models = {"agent": plan.agents[0], "dynamics": plan.dynamics[0]}
+    models = {"agent": plan.by_seed("agent")[0], "dynamics": plan.by_seed("dynamics")[0]}
     assert recipe.inputs == plan.datasets | models  # what distances are measured to
     assert recipe.key not in plan.needed
 

@@ -153,7 +153,7 @@ def test_only_a_fine_tuned_stitch_depends_on_the_agent(spec: Spec) -> None:
     mixtures = get_args(Mixture)
     methods = tuple(f"mf-stitch[mixture={mixture}]" for mixture in mixtures)
     plan = make_plan(replace(spec, methods=methods, seeds=1))
-    made = [plan.mf_policies[0, method] for method in methods]
+    made = [plan.models["mf-policy", 0, method] for method in methods]
     assert len(set(made)) == len(mixtures)
     for mixture, key in zip(mixtures, made, strict=True):
         inputs = plan.recipes[key].inputs
@@ -192,20 +192,20 @@ def test_no_score_depends_on_what_is_only_looked_at(plan: Plan) -> None:
 
 def test_initiation_sets_are_of_the_data_alone(spec: Spec) -> None:
     plan = make_plan(replace(spec, methods=("no-stitch", "reach-stitch")))
-    key = plan.initiation_sets[0]
-    assert set(plan.initiation_sets.values()) == {key}
-    assert plan.recipes[key].inputs == plan.recipes[plan.agents[0]].inputs
+    key = plan.by_seed("initiation-sets")[0]
+    assert set(plan.by_seed("initiation-sets").values()) == {key}
+    assert plan.recipes[key].inputs == plan.recipes[plan.by_seed("agent")[0]].inputs
     other = replace(spec, methods=("reach-stitch",), agent=replace(spec.agent, width=7), seeds=1)
-    assert make_plan(other).initiation_sets == {0: key}
+    assert make_plan(other).by_seed("initiation-sets") == {0: key}
     assert key in plan.needed
-    assert not make_plan(spec).initiation_sets
+    assert not make_plan(spec).by_seed("initiation-sets")
 
 
 @pytest.mark.parametrize("setting", [{"swap": 0.8}, {"corrections": 1.5}], ids=str)
 def test_what_belongs_together_names_an_agent_that_alters_it(setting: dict[str, float]) -> None:
     kitchen = load_spec("table2", "smoke")
     altered = make_plan(replace(kitchen, agent=replace(kitchen.agent, **setting)))
-    agent = altered.recipes[altered.agents[0]]
+    agent = altered.recipes[altered.by_seed("agent")[0]]
     assert agent.params["factors"]["own"]["kettle"] == "kettle"
     usual = make_plan(kitchen)
-    assert "factors" not in usual.recipes[usual.agents[0]].params
+    assert "factors" not in usual.recipes[usual.by_seed("agent")[0]].params

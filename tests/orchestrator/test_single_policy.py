@@ -34,7 +34,8 @@ def test_table4_has_the_papers_rows(spec: Spec) -> None:
 @pytest.mark.parametrize("scale", ["smoke", "quick", "standard", "paper"])
 def test_the_skills_and_the_dynamics_are_table_2s(scale: Scale) -> None:
     ours, theirs = (make_plan(load_spec(name, scale)) for name in ("table4", "table2"))
-    assert (ours.agents, ours.dynamics) == (theirs.agents, theirs.dynamics)
+    for kind in ("agent", "dynamics"):
+        assert ours.by_seed(kind) == theirs.by_seed(kind)
     assert ours.spec.mb_stitch == theirs.spec.mb_stitch
 
 
@@ -62,29 +63,29 @@ def test_its_nodes_are_its_own_from_the_first_skill_on(spec: Spec, plan: Plan) -
 def test_it_is_played_by_its_policy_alone_to_the_tasks_limit(plan: Plan) -> None:
     for (node, _), task in plan.tasks.items():
         if node.method == METHOD:
-            assert task.artifacts == {METHOD: plan.single_policies[node.seed, METHOD]}
-            assert task.rollout["skill_limit"] == 0
+            assert task.artifacts == {METHOD: plan.by_seed(METHOD)[node.seed]}
+            assert task.rollout.skill_limit == 0
         else:
-            assert task.rollout["skill_limit"] == plan.spec.rollout.skill_limit
+            assert task.rollout.skill_limit == plan.spec.rollout.skill_limit
 
 
 def test_its_demonstrations_teach_it_and_nothing_else(plan: Plan) -> None:
     role = f"demonstrations of {METHOD}"
-    policy = plan.recipes[plan.single_policies[0, METHOD]]
+    policy = plan.recipes[plan.by_seed(METHOD)[0]]
     assert list(policy.inputs.values()) == [plan.datasets[role]]
     params = plan.recipes[plan.datasets[role]].params
     assert ">".join(params["order"]) == plan.spec.single_policy.task
     skills = plan.recipes[plan.datasets["demonstrations-microwave-top-hinge-slide"]].params
     assert params["config"] == skills["config"] | {"episodes": plan.spec.single_policy.episodes}
-    others = {*plan.agents.values(), *plan.dynamics.values()}
+    others = {*plan.by_seed("agent").values(), *plan.by_seed("dynamics").values()}
     assert not any(plan.datasets[role] in plan.recipes[key].inputs.values() for key in others)
 
 
 def test_its_settings_touch_it_alone(spec: Spec, plan: Plan) -> None:
     fewer = make_plan(replace(spec, methods=("single-policy[episodes=60]", "mb-stitch")))
-    assert fewer.single_policies.keys() != plan.single_policies.keys()
+    assert fewer.by_seed(METHOD) != plan.by_seed(METHOD)
     assert set(plan.recipes) - set(fewer.recipes) == {
-        *plan.single_policies.values(), plan.datasets[f"demonstrations of {METHOD}"]
+        *plan.by_seed(METHOD).values(), plan.datasets[f"demonstrations of {METHOD}"]
     }  # fmt: skip
 
 

@@ -8,11 +8,12 @@ from typing import get_args
 import pytest
 
 from orchestrator.errors import UsageError
-from orchestrator.methods import MBStitchConfig, method_label
+from orchestrator.methods import method_label
 from orchestrator.spec import differences, load_spec, packaged_specs, spec_from_plain
 from orchestrator.structure import to_plain
 from orchestrator.suite import Suite, load_asked
 from orchestrator.tomls import Scale
+from stitching.methods.mb_stitch import MBStitchSettings
 
 
 @pytest.mark.parametrize("name", packaged_specs())
@@ -130,7 +131,7 @@ def test_the_spec_below_is_sound(tmp_path: Path) -> None:
         (SOUND + "agent.swap = 0.5", "agent: what maze shows does not tell its robot"),
         (SOUND + "agent.corrections = 1.5", "agent: what maze shows does not tell its robot"),
         (SOUND + "agent.swap = 1.5", "agent, swap: must be at most 1: 1.5"),
-        (MF + "training.swap = 0.5", "mf_stitch, training: only the agent learns with swap"),
+        (MF + "training.swap = 0.5", "mf-stitch, training: only the agent learns with swap"),
         (
             SOUND.replace("no-stitch", "mf-stitch[training.swap=0.5]"),
             "only the agent learns with swap",
@@ -172,10 +173,10 @@ def test_a_malicious_spec_runs_nothing(tmp_path: Path, bait: str) -> None:
 
 def test_methods_take_settings() -> None:
     spec = load_spec("table1")
-    config = spec.method_config("mb-stitch[alpha=1,beta=2.5,norm=max]")
-    assert isinstance(config, MBStitchConfig)
-    assert (config.alpha, config.beta, config.norm) == (1.0, 2.5, "max")
-    assert config.random_shooting == spec.mb_stitch.random_shooting
+    settings = spec.method_settings("mb-stitch[alpha=1,beta=2.5,norm=max]")
+    assert isinstance(settings, MBStitchSettings)
+    assert (settings.alpha, settings.beta, settings.norm) == (1.0, 2.5, "max")
+    assert settings.random_shooting == spec.mb_stitch.random_shooting
     assert method_label("mb-stitch[alpha=1,beta=2.5]") == "MB-Stitch [alpha=1,beta=2.5]"
 
 
@@ -183,7 +184,10 @@ def test_methods_take_settings() -> None:
     ("method", "message"),
     [
         ("mb-stich", "unknown method 'mb-stich'; there are no-stitch, random-stitch"),
-        ("mb-stitch[alhpa=1]", "unknown field 'alhpa'; valid are limit"),
+        (
+            "mb-stitch[alhpa=1]",
+            "unknown field 'alhpa'; valid are planner, limit",
+        ),
         ("mb-stitch[alpha=big]", "alpha: expected float"),
         ("mb-stitch[alpha=1", "write name or name"),
         ("mb-stitch[planner=magic]", "'magic' is not one of random-shooting, cem"),

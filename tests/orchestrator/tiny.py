@@ -13,7 +13,6 @@ from orchestrator.jobs import BuildJob, Job
 from orchestrator.ledger import Ledger, Outcome
 from orchestrator.methods import (
     first_method,
-    make_stitcher,
     method_block,
     method_name,
     method_of,
@@ -25,8 +24,8 @@ from orchestrator.reproduce import Settings, reproduce
 from orchestrator.rundir import RunDirectory
 from orchestrator.spec import Spec, load_spec
 from orchestrator.store import Store
-from orchestrator.structure import to_plain
 from stitching.envs.registry import BENCHMARKS
+from stitching.models.agent import Agent
 from stitching.rollout import Play, Segments, play_from_start
 
 TINY = Path(__file__).with_name("tiny.toml")
@@ -153,12 +152,12 @@ class Alone:
         task = self.plan.tasks[Node(self.seed, self.method, self.task), self.chunk]
         artifacts = {kind: self.place.store.read(kind, key) for kind, key in task.artifacts.items()}
         models = load_models(benchmark, task.configs, artifacts)
-        settings = to_plain(spec.method_config(self.method))
-        agent = models[method_of(self.method).policy]
+        method = method_of(self.method)
+        agent = models.one(method.policy, Agent)
         return play_from_start(
             method_block(self.method, benchmark),
             agent,
-            make_stitcher(self.method, settings, benchmark, agent, models),
+            method.stitcher(spec.method_settings(self.method), models),
             benchmark,
             method_rollout(self.method, spec.rollout),
             Play(

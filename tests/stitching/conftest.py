@@ -8,17 +8,22 @@ from hypothesis import settings
 from stitching.data.experience import skill_experience
 from stitching.data.initiation import initiation_set, pose_scale
 from stitching.data.maze import MazeDataConfig, exploration, skill_demonstrations
-from stitching.data.mixtures import mixed_experience, skill_pairs
+from stitching.data.mixtures import mixed_experience
 from stitching.data.transitions import Transitions, concatenate
 from stitching.data.uncut import no_conditions, uncut_experience
 from stitching.envs.maze import Maze
 from stitching.envs.protocol import conditions
+from stitching.methods.mb_stitch import MBStitch, MBStitchSettings
+from stitching.methods.mf_stitch import MFStitch, MFStitchSettings
+from stitching.methods.no_stitch import NoStitch
+from stitching.methods.protocol import Models, Stitcher
+from stitching.methods.random_stitch import RandomStitch, RandomStitchSettings
+from stitching.methods.reach_stitch import ReachStitch, ReachStitchSettings
 from stitching.models.agent import Agent
 from stitching.models.dynamics import Dynamics, DynamicsConfig, train_dynamics
+from stitching.models.initiation import Initiation
 from stitching.models.iql import IQLConfig, train_iql
 from stitching.planning.random_shooting import RandomShooting
-from stitching.reach_stitch import Initiation, ReachStitch
-from stitching.stitchers import MBStitch, MFStitch, NoStitch, RandomStitch, Stitcher
 
 torch.set_num_threads(1)
 
@@ -84,8 +89,6 @@ def stitchers(
     dynamics: Dynamics,
 ) -> dict[str, Stitcher]:
     """The methods that join skills, and MB-Stitch that plans anew after every action, by name."""
-    planner = RandomShooting(population=30, horizon=4)
-    planning = (agent, dynamics, planner, maze.actions, 1.0, 1.0, "mean")
     sets = [initiation_set(demonstrations, maze.factors, skill) for skill in range(4)]
     initiation = Initiation(
         list(maze.factors.pose),
@@ -94,14 +97,23 @@ def stitchers(
         [maze.factors.others_than(skill.name) for skill in maze.skills],
         [one.radius for one in sets],
     )
-    pairs = {pair: row for row, pair in enumerate(skill_pairs(len(maze.skills)))}
+    trained = {
+        "agent": agent,
+        "dynamics": dynamics,
+        "mf-policy": mf_policy,
+        "initiation-sets": initiation,
+    }
+    models = Models(maze.actions, len(maze.skills), trained)
+    planning = {
+        "planner": "random-shooting",
+        "random_shooting": RandomShooting(population=30, horizon=4),
+    }
+    reach = ReachStitchSettings(limit=8, **planning)
     return {
         "no-stitch": NoStitch(),
-        "random-stitch": RandomStitch(maze.actions, limit=5),
-        "mf-stitch": MFStitch(mf_policy, pairs, limit=5),
-        "mb-stitch": MBStitch(*planning, execute=4, limit=5),
-        "mb-stitch[execute=1]": MBStitch(*planning, execute=1, limit=5),
-        "reach-stitch": ReachStitch(
-            initiation, dynamics, planner, maze.actions, beta=0.5, norm="mean", execute=1, limit=8
-        ),
+        "random-stitch": RandomStitch(RandomStitchSettings(limit=5), models),
+        "mf-stitch": MFStitch(MFStitchSettings(limit=5), models),
+        "mb-stitch": MBStitch(MBStitchSettings(execute=4, **planning), models),
+        "mb-stitch[execute=1]": MBStitch(MBStitchSettings(**planning), models),
+        "reach-stitch": ReachStitch(reach, models),
     }

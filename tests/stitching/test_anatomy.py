@@ -10,11 +10,13 @@ import torch
 from stitching.anatomy import START, Subject, anatomy
 from stitching.data.transitions import Transitions
 from stitching.envs.maze import Maze
+from stitching.methods.mb_stitch import MBStitch
+from stitching.methods.no_stitch import NoStitch
+from stitching.methods.protocol import Proposal, Stitcher
 from stitching.models.agent import Agent
 from stitching.planning.objective import spread_over_members
 from stitching.planning.random_shooting import RandomShooting
 from stitching.rollout import Play, RolloutConfig, play_from_start
-from stitching.stitchers import MBStitch, NoStitch, Proposal, Stitcher
 
 EPISODES = 8
 PAIRS = [("b", "a"), ("b", "d"), ("d", "b")]
@@ -26,8 +28,8 @@ LIMIT = 30
 class EveryOther(MBStitch):
     """Declines the second, fourth, … of those it is asked about."""
 
-    def propose(self, *asked: Any) -> Proposal:
-        proposal = super().propose(*asked)
+    def proposal(self, *asked: Any) -> Proposal:
+        proposal = super().proposal(*asked)
         return replace(proposal, wanted=np.arange(len(proposal.actions)) % 2 == 0)
 
 
@@ -100,7 +102,7 @@ def test_some_stitch_is_taken_apart_step_by_step(subject: Subject, study: dict[s
     for stitch in study["stitches"]:
         steps = len(stitch["value"]) - 1
         assert len(stitch["spread"]) == len(stitch["distance"]) == steps + 1
-        plans = range(0, steps, subject.stitcher.execute)
+        plans = range(0, steps, subject.stitcher.settings.execute)
         assert [plan["step"] for plan in stitch["plans"]] == list(plans)
 
 
@@ -109,7 +111,10 @@ def test_plans_are_written_down_as_eq_2_sees_them(
 ) -> None:
     """With plans of one action the objective is made of the very terms that are written down."""
     planner = RandomShooting(population=30, horizon=1)
-    stitcher = replace(subject.stitcher, planner=planner, alpha=2.0, beta=3.0, execute=1)
+    settings = replace(
+        subject.stitcher.settings, random_shooting=planner, alpha=2.0, beta=3.0, execute=1
+    )
+    stitcher = replace(subject.stitcher, settings=settings)
     short = anatomy(replace(subject, stitcher=stitcher), demonstrations, PAIRS[:1], EPISODES)
     plans = [plan for stitch in short["stitches"] for plan in stitch["plans"]]
     assert plans

@@ -9,9 +9,9 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 import pytest
 from annotated_types import Interval
 
-from orchestrator.methods import METHODS
 from orchestrator.spec import Spec
 from stitching.bounds import Amount, Bounded, Count, Inside, NotNegative, Share
+from stitching.methods.registry import METHODS
 from sweeps.spec import SweepSpec
 
 # Searched numbers may lie anywhere that their own field allows: the spec is built at the corners.
@@ -80,7 +80,7 @@ def parts(hint: Any) -> Iterator[Any]:
 
 def test_every_number_of_every_setting_has_a_range() -> None:
     classes: set[type] = set()
-    for cls in (Spec, SweepSpec, *(method.config for method in METHODS.values())):
+    for cls in (Spec, SweepSpec, *(method.settings for method in METHODS.values())):
         list(settings(cls, classes))
     numbers = 0
     for cls in classes:
@@ -100,7 +100,7 @@ def test_every_number_of_every_setting_has_a_range() -> None:
 @pytest.mark.parametrize("method", ["random-stitch", "mf-stitch", "mb-stitch", "reach-stitch"])
 def test_a_stitch_limit_below_zero_is_refused(method: str) -> None:
     with pytest.raises(ValueError, match="limit: must be at least 0: -1"):
-        METHODS[method].config(limit=-1)  # type: ignore[call-arg]
+        METHODS[method].settings(limit=-1)  # type: ignore[call-arg]
 
 
 def test_ranges_are_the_library_s() -> None:

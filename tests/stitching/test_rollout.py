@@ -20,7 +20,10 @@ from torch import Tensor
 
 from stitching.envs.first_times import FirstTimes
 from stitching.envs.maze import Maze, MazeBlock
-from stitching.envs.protocol import EpisodeBlock, conditions
+from stitching.envs.protocol import ActionSpace, EpisodeBlock, conditions
+from stitching.methods.no_stitch import NoStitch
+from stitching.methods.protocol import Models, Proposal, Stitcher
+from stitching.methods.random_stitch import RandomStitch, RandomStitchSettings
 from stitching.models.agent import Agent
 from stitching.rollout import (
     Play,
@@ -29,8 +32,9 @@ from stitching.rollout import (
     begin,
     play_from_start,
     play_segment,
+    policy_noise,
 )
-from stitching.stitchers import NoStitch, Proposal, RandomStitch, Stitcher
+from tests.stitching.methods.linear import ARM, MOVES, streams
 
 SAMPLED, MODE = RolloutConfig(temperature=1.0), RolloutConfig()
 FIRST = replace(SAMPLED, first_stitch=True)
@@ -383,11 +387,15 @@ def test_first_skills_are_not_stitched(
     assert raw(segments) == raw(first(NoStitch(), ""))
 
 
+def random_stitch(actions: ActionSpace, limit: int) -> RandomStitch:
+    return RandomStitch(RandomStitchSettings(limit), Models(actions, 0, {}))
+
+
 def test_a_limit_of_0_is_no_stitching(maze: Maze, agent: Agent) -> None:
     play = play_of("any", TASKS[0])
     none, limited = (
         play_from_start(maze.block(), agent, stitcher, maze, SAMPLED, play, STEP_LIMIT)
-        for stitcher in (NoStitch(), RandomStitch(maze.actions, limit=0))
+        for stitcher in (NoStitch(), random_stitch(maze.actions, limit=0))
     )
     assert [raw(s) for s in none] == [raw(s) for s in limited]
     assert not any(s.stitch_steps.any() for s in none)
@@ -840,7 +848,7 @@ def test_policies_meet_the_same_chance_after_any_stitch() -> None:
     none = displacements(NoStitch(), "no-stitch")
     assert len({tuple(moves) for moves in none}) > 3
     assert all(len(moves) == 4 for moves in none)
-    random = displacements(RandomStitch(FLOOR.actions, limit=2), "random-stitch")
+    random = displacements(random_stitch(FLOOR.actions, limit=2), "random-stitch")
     posts = displacements(Signposts({row: [DOWN] for row in range(1, 12)}, limit=1), "signposts")
     assert random == none == posts
 
@@ -860,3 +868,15 @@ def test_a_task_ends_when_nobody_is_left() -> None:
     assert len(played) == 1
     assert not played[0].success.any()
     assert (played[0].steps == 20).all()
+
+
+def test_policy_noise_is_each_streams_own() -> None:
+    uniform = policy_noise(MOVES, streams(500))
+    normal = policy_noise(ARM, streams(500))
+    assert (uniform.shape, normal.shape) == ((500, 1), (500, 2))
+    assert uniform.dtype == normal.dtype == np.float32
+    assert 0 <= uniform.min() < 0.05 < 0.95 < uniform.max() <= 1
+    assert abs(normal.mean()) < 0.1
+    assert normal.std() == pytest.approx(1, abs=0.1)
+    for space, noise in ((MOVES, uniform), (ARM, normal)):
+        assert np.array_equal(policy_noise(space, streams(500)[7:9]), noise[7:9])

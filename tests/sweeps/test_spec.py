@@ -56,7 +56,11 @@ def test_a_search_in_kitchen_sees_some_of_its_pairs() -> None:
 @pytest.mark.parametrize(
     ("path", "dimension", "message"),
     [
-        ("mb_stitch.gamma", Dimension(low=0.1, high=1.0), "unknown field 'gamma'; valid are limit"),
+        (
+            "mb_stitch.gamma",
+            Dimension(low=0.1, high=1.0),
+            "unknown field 'gamma'; valid are planner, limit",
+        ),
         ("mb_stich.alpha", Dimension(low=0.1, high=1.0), "begin with one of mb_stitch, agent"),
         ("episodes", Dimension(low=1, high=9), "'episodes' cannot be searched"),
         (ALPHA, Dimension(low=2.0, high=1.0), "low must be below high: 2.0, 1.0"),
@@ -151,9 +155,9 @@ def test_methods_take_settings_of_their_planner() -> None:
     """What makes a trial a method: dots lead into fields of fields."""
     spec = load_spec("table2")
     own = replaced(spec, {"mb_stitch.cem.horizon": 3, "mb_stitch.alpha": 2}, "")
-    assert spec.method_config("mb-stitch[alpha=2,cem.horizon=3]") == own.mb_stitch
+    assert spec.method_settings("mb-stitch[alpha=2,cem.horizon=3]") == own.mb_stitch
     with pytest.raises(UsageError, match="unknown field 'horizons'"):
-        spec.method_config("mb-stitch[cem.horizons=3]")
+        spec.method_settings("mb-stitch[cem.horizons=3]")
 
 
 def test_every_cell_of_table9_stands_beside_the_paper_s() -> None:

@@ -18,10 +18,10 @@ from stitching.data.robosuite.demonstrations import RobosuiteDataConfig, collect
 from stitching.envs.protocol import conditions, skill_index
 from stitching.envs.robosuite.can import CAN, Can
 from stitching.envs.robosuite.door import DOOR, Door
+from stitching.methods.no_stitch import NoStitch
 from stitching.models.agent import Agent
 from stitching.models.iql import IQLConfig, train_single_tasks
 from stitching.rollout import Play, RolloutConfig, play_from_start, play_segment
-from stitching.stitchers import NoStitch
 
 
 @dataclass(frozen=True)

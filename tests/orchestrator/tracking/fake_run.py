@@ -16,6 +16,7 @@ from orchestrator.tracking.views import METHOD, RUN_ID, SEED
 
 SKILLS = ["g0", "g1", "g2"]
 METHODS = {"no-stitch": "No-Stitch", "mf-stitch": "MF-Stitch", "mb-stitch[alpha=2.5]": "MB-Stitch"}
+OWN = {"mf-stitch": ["mf-policy"], "mb-stitch[alpha=2.5]": ["dynamics"]}  # beside the agent
 SEEDS = [0, 1]
 CHILDREN = len(METHODS) * len(SEEDS)
 
@@ -27,7 +28,10 @@ def make_spec() -> dict:
         "benchmark": "maze",
         "scale": "smoke",
         "skills": SKILLS,
-        "methods": [{"name": name, "label": label} for name, label in METHODS.items()],
+        "methods": [
+            {"name": name, "label": label, "models": ["agent", *OWN.get(name, [])]}
+            for name, label in METHODS.items()
+        ],
         "seeds": SEEDS,
         "episodes": 4,
         "tasks": [">".join(task) for n in (2, 3) for task in permutations(SKILLS, n)],

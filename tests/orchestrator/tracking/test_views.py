@@ -118,5 +118,5 @@ def test_several_artifacts_of_a_kind_keep_their_curves_apart() -> None:
         {"kind": "agent", "seed": 0, "key": key, "curves": {"loss": [[1, 2.0], [2, float("nan")]]}}
         for key in ("aaaaaaaaaa", "bbbbbbbbbb")
     ]
-    curves = learning_curves("no-stitch", 0, training)
+    curves = learning_curves("no-stitch", ["agent"], 0, training)
     assert curves == {"agent aaaaaaaa/loss": [(1, 2.0)], "agent bbbbbbbb/loss": [(1, 2.0)]}

@@ -9,11 +9,11 @@ import pytest
 from stitching.data.maze import MazeDataConfig, skill_demonstrations
 from stitching.data.transitions import Transitions
 from stitching.envs.maze import Maze
+from stitching.methods.protocol import Stitcher
 from stitching.models.agent import Agent
 from stitching.rollout import RolloutConfig
 from stitching.showcase.maze import DEMONSTRATIONS, maze_showcase
 from stitching.showcase.shown import Shown
-from stitching.stitchers import Stitcher
 
 TASK, STEP_LIMIT, CONFIG = ("a", "b", "d"), 40, RolloutConfig(temperature=1.0)
 

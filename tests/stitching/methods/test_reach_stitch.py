@@ -7,9 +7,11 @@ import torch
 from torch import Tensor
 
 from stitching.envs.protocol import ActionSpace
+from stitching.methods.protocol import Models
+from stitching.methods.reach_stitch import ReachStitch, ReachStitchSettings
 from stitching.models.dynamics import Dynamics, DynamicsConfig
+from stitching.models.initiation import Initiation
 from stitching.planning.cem import CEM
-from stitching.reach_stitch import Initiation, ReachStitch
 from stitching.streams import stream
 
 PLANE = ActionSpace(2, discrete=False)
@@ -40,9 +42,14 @@ def moves_by(*steps: np.ndarray, drift: np.ndarray | None = None) -> Dynamics:
 SURE = np.array([[0.2, 0.0, 0.0], [0.0, 0.0, 0.1]])  # an action moves x and y
 
 
-def reach(*steps: np.ndarray, beta: float = 0.0) -> ReachStitch:
-    dynamics = moves_by(*steps)
-    return ReachStitch(SETS, dynamics, PLANNER, PLANE, beta, "mean", execute=1, limit=20)
+def reach(
+    *steps: np.ndarray,
+    beta: float = 0.0,
+    sets: Initiation = SETS,
+    drift: np.ndarray | None = None,
+) -> ReachStitch:
+    trained = {"initiation-sets": sets, "dynamics": moves_by(*steps, drift=drift)}
+    return ReachStitch(ReachStitchSettings(beta=beta, cem=PLANNER), Models(PLANE, 2, trained))
 
 
 def streams(n: int) -> list[np.random.Generator]:
@@ -122,9 +129,7 @@ def test_it_plans_among_the_objects_of_the_nearest_start() -> None:
     assert states[:, 1].tolist() == [77.0, -77.0]
 
     def proposed(sets: Initiation, states: Tensor) -> np.ndarray:
-        dynamics = moves_by(SURE, drift=drift)
-        stitcher = ReachStitch(sets, dynamics, PLANNER, PLANE, 0.0, "mean", execute=1, limit=20)
-        return stitcher.propose(states, None, 0, streams(2)).actions
+        return reach(SURE, sets=sets, drift=drift).propose(states, None, 0, streams(2)).actions
 
     as_they_are = proposed(replace(SETS, others=[[], []]), states)
     assert np.array_equal(proposed(SETS, states), proposed(SETS, known))

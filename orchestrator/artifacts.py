@@ -1,0 +1,216 @@
+"""The artifacts that a spec needs: its datasets, its models, and what is only looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import chain, pairwise
+from typing import TypeVar
+
+from orchestrator.errors import UsageError
+from orchestrator.kits import KITS, TEACHING, Dataset, Illustration
+from orchestrator.methods import SHARED, method_of
+from orchestrator.recipes import Recipe
+from orchestrator.spec import Spec
+from orchestrator.structure import Plain, to_plain
+from stitching.envs.registry import BENCHMARKS
+from stitching.methods.mb_stitch import MB_STITCH
+from stitching.methods.mf_stitch import MFStitchSettings
+from stitching.methods.no_stitch import NO_STITCH
+from stitching.methods.planning import PlanningSettings
+from stitching.methods.protocol import Method, MethodSettings
+from stitching.methods.single_policy import SinglePolicySettings
+
+S = TypeVar("S", bound=MethodSettings)
+
+
+@dataclass
+class Artifacts:
+    """Recipes by key, in an order in which they can be made."""
+
+    spec: Spec
+    recipes: dict[str, Recipe] = field(default_factory=dict)
+    datasets: dict[str, str] = field(default_factory=dict)  # learned from: role → key
+    models: dict[tuple[str, int, str], str] = field(default_factory=dict)  # see `Plan.models`
+    illustrations: dict[str, str] = field(default_factory=dict)  # name → key
+
+    def add(self, kind: str, params: Plain, inputs: dict[str, str] | None = None) -> str:
+        """Key of the recipe; the same one twice is one."""
+        recipe = Recipe(kind, {"benchmark": self.spec.benchmark, **params}, inputs or {})
+        self.recipes[recipe.key] = recipe
+        return recipe.key
+
+    def add_models(self) -> None:
+        """What the spec's methods are played with, under every seed."""
+        players = [*self.spec.methods]
+        if any(method_of(method).told for method in players):
+            players.append(SHARED)
+        needed = {kind for method in players for kind in method_of(method).models}
+        if unknown := sorted(needed - MODELS.keys()):
+            raise UsageError(f"no recipe for models of kind {unknown[0]!r}")
+        for kind, recipe_of in MODELS.items():
+            for seed in range(self.spec.seeds):
+                for method in players:
+                    if kind in method_of(method).models:
+                        self.models[kind, seed, method] = recipe_of(self, seed, method)
+
+    def add_illustrations(self) -> None:
+        """What is looked at of MB-Stitch, with seed 0's models; of several, the first one's."""
+        ours = _settings(self.spec, MB_STITCH)[:1]
+        if not ours:
+            return
+        kit, root = KITS[self.spec.benchmark], {"root_seed": self.spec.root_seed}
+        extras = {
+            role: self.add(kind, {"config": to_plain(self.spec.data), **root})
+            for role, kind in kit.extras.items()
+        }
+        models = {kind: self.models[kind, 0, ours[0][0]] for kind in MB_STITCH.models}
+        there = models | self.datasets | extras
+        for name, one in kit.illustrations.items():
+            roles = [self.demonstrations if role == TEACHING else (role,) for role in one.inputs]
+            inputs = {role: there[role] for role in chain.from_iterable(roles)}
+            self.illustrations[name] = self.add(one.kind, _illustrated(self.spec, one), inputs)
+
+    @cached_property
+    def demonstrations(self) -> dict[str, str]:
+        """The datasets that skills are learned from: role → key."""
+        return {
+            role: self.all_data[role] for role, one in self._kit_datasets.items() if one.teaches
+        }
+
+    @cached_property
+    def all_data(self) -> dict[str, str]:
+        """The datasets that dynamics are learned from: role → key."""
+        made = {
+            role: self.add(one.kind, {"config": self.data_settings, **self.root, **one.params})
+            for role, one in self._kit_datasets.items()
+        }
+        self.datasets |= made
+        return made
+
+    @cached_property
+    def data_settings(self) -> Plain:
+        """Settings of the data, but for those that nothing learned from depends on."""
+        looked_at = KITS[self.spec.benchmark].for_extras
+        settings = to_plain(self.spec.data)
+        return {name: value for name, value in settings.items() if name not in looked_at}
+
+    @cached_property
+    def _kit_datasets(self) -> dict[str, Dataset]:
+        return KITS[self.spec.benchmark].datasets(self.spec.data)
+
+    def settings(self, method: str, expected: type[S]) -> S:
+        """Of a method that asks for a model. Raises TypeError where they do not say how it is."""
+        settings = self.spec.method_settings(method)
+        if not isinstance(settings, expected):
+            raise TypeError(f"{method}: has no {expected.__name__}, which its models need")
+        return settings
+
+    @property
+    def root(self) -> dict[str, int]:
+        return {"root_seed": self.spec.root_seed}
+
+    @property
+    def factors(self) -> Plain:
+        """Which numbers of an observation belong together."""
+        plain: Plain = to_plain(BENCHMARKS[self.spec.benchmark].factors)
+        return plain
+
+
+def _agent(make: Artifacts, seed: int, method: str) -> str:
+    learner = {"config": to_plain(make.spec.agent)}
+    if make.spec.agent.alters:
+        learner["factors"] = make.factors
+    return make.add("agent", {**learner, **make.root, "seed": seed}, make.demonstrations)
+
+
+def _initiation_sets(make: Artifacts, seed: int, method: str) -> str:
+    """The same for all seeds: they are of the data alone."""
+    return make.add("initiation-sets", {"factors": make.factors}, make.demonstrations)
+
+
+def _dynamics(make: Artifacts, seed: int, method: str) -> str:
+    params = {"config": to_plain(make.spec.dynamics), "seed": seed, **make.root}
+    return make.add("dynamics", params, make.all_data)
+
+
+def _mf_policy(make: Artifacts, seed: int, method: str) -> str:
+    settings = make.settings(method, MFStitchSettings)
+    params = {"config": to_plain(settings.training), "seed": seed, **make.root}
+    fine_tuned = settings.mixture == "fine-tuned"
+    start = {"agent": make.models["agent", seed, method]} if fine_tuned else {}
+    inputs = make.demonstrations | start
+    return make.add("mf-policy", params | {"mixture": settings.mixture}, inputs)
+
+
+def _single_policy(make: Artifacts, seed: int, method: str) -> str:
+    settings = make.settings(method, SinglePolicySettings)
+    kind = KITS[make.spec.benchmark].long_horizon(make.spec.data)
+    shown = {"config": make.data_settings | {"episodes": settings.episodes}, **make.root}
+    key = make.add(kind, shown | {"order": settings.order})
+    make.datasets[f"demonstrations of {method}"] = key
+    params = {"config": to_plain(settings.training), "seed": seed, **make.root}
+    return make.add("single-policy", params, {"long-horizon": key})
+
+
+MODELS: dict[str, Callable[[Artifacts, int, str], str]] = {
+    "agent": _agent,
+    "initiation-sets": _initiation_sets,
+    "dynamics": _dynamics,
+    "mf-policy": _mf_policy,
+    "single-policy": _single_policy,
+}
+"""How the recipe of a kind of model is made, for a seed and the method that asks for it."""
+
+
+def _illustrated(spec: Spec, illustration: Illustration) -> Plain:
+    """Parameters of an illustration; one that plays a task does so by No- and MB-Stitch.
+
+    Of several MB-Stitches, the first. One that takes stitches apart knows what No-Stitch is.
+    """
+    params: Plain = {
+        "configs": {"dynamics": to_plain(spec.dynamics)},
+        "rollout": to_plain(spec.rollout),
+        "step_limit": spec.step_limit,
+        "root_seed": spec.root_seed,
+        "seed": 0,
+    }
+    ours = _settings(spec, MB_STITCH)[:1]
+    if illustration.pairs:
+        return params | {
+            "methods": ours,
+            "pairs": _spread_out(_neighbours(spec), illustration.pairs),
+            "episodes": min(illustration.episodes, spec.episodes),
+        }
+    task = illustration.task
+    if not task:
+        planning = spec.method_settings(ours[0][0])
+        assert isinstance(planning, PlanningSettings)
+        return params | {"horizon": planning.chosen.horizon}
+    return params | {
+        # Whatever their order in the spec.
+        "methods": _settings(spec, NO_STITCH) + ours,
+        "task": task if task in spec.all_tasks else max(spec.all_tasks, key=len),
+    }
+
+
+def _settings(spec: Spec, kind: Method) -> list[tuple[str, Plain]]:
+    """The spec's methods of a kind, each with its settings."""
+    return [
+        (method, to_plain(spec.method_settings(method)))
+        for method in spec.methods
+        if method_of(method) is kind
+    ]
+
+
+def _neighbours(spec: Spec) -> list[tuple[str, ...]]:
+    """Skills that follow one another in some task, each pair once."""
+    return list(dict.fromkeys(pair for task in spec.all_tasks for pair in pairwise(task)))
+
+
+def _spread_out(pairs: list[tuple[str, ...]], most: int) -> list[tuple[str, ...]]:
+    """At most so many, at equal distances, with the first and the last."""
+    if len(pairs) <= most:
+        return pairs
+    return [pairs[round(i * (len(pairs) - 1) / max(1, most - 1))] for i in range(most)]

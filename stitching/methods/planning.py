@@ -1,0 +1,30 @@
+"""What the settings of all methods that plan have in common."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from stitching.envs.protocol import Benchmark
+from stitching.methods.protocol import MethodSettings
+from stitching.models.iql import IQLConfig
+from stitching.planning.registry import PLANNERS, PlannerChoice
+from stitching.registry import field_name
+
+
+@dataclass(frozen=True)
+class PlanningSettings(PlannerChoice, MethodSettings):
+    """A planner and its settings; each method declares its own defaults."""
+
+    def check(self, benchmark: Benchmark, agent: IQLConfig) -> None:
+        """Refuse a planner that cannot search the benchmark's actions."""
+        if self.chosen.can_search(benchmark.actions):
+            return
+        kind = "discrete" if benchmark.actions.discrete else "continuous"
+        others = [name for name in PLANNERS if self._can_search(name, benchmark)]
+        raise ValueError(
+            f"{self.planner} cannot plan the {kind} actions of {benchmark.name}; set planner to "
+            f"{' or '.join(others)}"
+        )
+
+    def _can_search(self, planner: str, benchmark: Benchmark) -> bool:
+        return bool(getattr(self, field_name(planner)).can_search(benchmark.actions))
