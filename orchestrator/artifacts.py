@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from orchestrator.errors import UsageError
 from orchestrator.kits import KITS, TEACHING, Dataset, Illustration
-from orchestrator.methods import SHARED, method_of
+from orchestrator.methods import SHARED, deciding, method_of
 from orchestrator.recipes import Recipe
 from orchestrator.spec import Spec
 from orchestrator.structure import Plain, to_plain
@@ -198,7 +198,7 @@ def _illustrated(spec: Spec, illustration: Illustration) -> Plain:
 def _settings(spec: Spec, kind: Method) -> list[tuple[str, Plain]]:
     """The spec's methods of a kind, each with its settings."""
     return [
-        (method, to_plain(spec.method_settings(method)))
+        (method, deciding(spec.method_settings(method)))
         for method in spec.methods
         if method_of(method) is kind
     ]

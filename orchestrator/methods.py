@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import re
 import tomllib
-from dataclasses import replace
+from dataclasses import is_dataclass, replace
 from typing import Any
 
 from orchestrator.errors import UsageError
+from orchestrator.structure import Plain, to_plain
 from stitching.envs.first_times import FirstTimes
 from stitching.envs.protocol import Benchmark, EpisodeBlock
 from stitching.methods.no_stitch import NO_STITCH
-from stitching.methods.protocol import Method
+from stitching.methods.protocol import Method, MethodSettings
 from stitching.methods.registry import METHODS
 from stitching.rollout import RolloutConfig
 
@@ -22,6 +23,18 @@ SHARED = ""
 def method_of(method: str) -> Method:
     """The registered method of `name` or `name[field=value,…]`; nothing is stitched in SHARED."""
     return NO_STITCH if method == SHARED else METHODS[method_name(method)]
+
+
+def deciding(settings: MethodSettings) -> Plain:
+    """The settings that have an effect, as names of blocks contain them."""
+    plain: Plain = to_plain(settings)
+    return {name: value for name, value in plain.items() if name not in settings.without_effect}
+
+
+def code_of(settings: MethodSettings) -> set[str]:
+    """The modules of settings that have an effect: a planner is its settings."""
+    parts = [getattr(settings, name) for name in deciding(settings)]
+    return {type(part).__module__ for part in (settings, *parts) if is_dataclass(part)}
 
 
 def first_method(method: str, rollout: RolloutConfig) -> str:

@@ -10,10 +10,18 @@ from typing import Any
 from orchestrator.artifacts import Artifacts
 from orchestrator.builders import BLOCK_CODE, BLOCK_SETUP
 from orchestrator.jobs import BlockTask
-from orchestrator.methods import SHARED, first_method, method_name, method_of, method_rollout
+from orchestrator.methods import (
+    SHARED,
+    code_of,
+    deciding,
+    first_method,
+    method_name,
+    method_of,
+    method_rollout,
+)
 from orchestrator.recipes import Recipe, code_fingerprint, digest
 from orchestrator.spec import Spec
-from orchestrator.structure import Plain, modules_of, to_plain
+from orchestrator.structure import Plain, to_plain
 from stitching.methods.protocol import MethodSettings
 from stitching.rollout import RolloutConfig
 
@@ -46,11 +54,11 @@ class Player:
         name = method_name(method) if method != SHARED else SHARED
         settings = spec.method_settings(method)
         rollout = method_rollout(method, spec.rollout)
-        code = (*BLOCK_CODE, method_of(method).module, *modules_of(settings))
+        code = {*BLOCK_CODE, method_of(method).module, *code_of(settings)}
         named = {
-            "settings": to_plain(settings),
+            "settings": deciding(settings),
             "rollout": to_plain(rollout),
-            "code": code_fingerprint(tuple(sorted(set(code))), BLOCK_SETUP),
+            "code": code_fingerprint(tuple(sorted(code)), BLOCK_SETUP),
         }
         if "dynamics" in method_of(method).models:
             named["dynamics"] = to_plain(spec.dynamics)

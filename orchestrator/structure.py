@@ -104,13 +104,6 @@ def to_plain(value: Any) -> Any:
     return value
 
 
-def modules_of(settings: Any) -> set[str]:
-    """The modules of a dataclass of settings and of those within it."""
-    parts = (getattr(settings, field.name) for field in fields(settings))
-    within = (modules_of(part) for part in parts if is_dataclass(part))
-    return {type(settings).__module__}.union(*within)
-
-
 def merged(base: Plain, overlay: Plain) -> Plain:
     """The overlay's fields over the base's, tables within tables likewise."""
     result = dict(base)

@@ -26,5 +26,10 @@ class PlanningSettings(PlannerChoice, MethodSettings):
             f"{' or '.join(others)}"
         )
 
+    @property
+    def without_effect(self) -> frozenset[str]:
+        """The settings of all planners but the chosen one."""
+        return frozenset(field_name(name) for name in PLANNERS if name != self.planner)
+
     def _can_search(self, planner: str, benchmark: Benchmark) -> bool:
         return bool(getattr(self, field_name(planner)).can_search(benchmark.actions))

@@ -87,6 +87,11 @@ class MethodSettings(Bounded):
     def check(self, benchmark: Benchmark, agent: IQLConfig) -> None:
         """Raise ValueError where they do not fit the benchmark or how the skills are learned."""
 
+    @property
+    def without_effect(self) -> frozenset[str]:
+        """Fields that decide nothing while the others are as they are."""
+        return frozenset()
+
 
 @dataclass(frozen=True)
 class Method:

@@ -5,12 +5,13 @@ import pytest
 import torch
 
 from stitching.envs.maze import Maze
+from stitching.envs.protocol import ActionSpace
 from stitching.methods.protocol import Models, Stitcher
 from stitching.methods.registry import METHODS
 from stitching.models.agent import Agent
-from tests.stitching.methods.linear import ARM, MOVES, streams
+from stitching.testing.stitchers import StitcherConformance
+from tests.stitching.methods.linear import ARM, streams
 
-PROPOSERS = ["random-stitch", "mf-stitch", "mb-stitch", "mb-stitch[execute=1]"]
 DRAWING = ["random-stitch", "mb-stitch"]  # those that leave something to chance
 
 
@@ -19,31 +20,25 @@ def states(maze: Maze) -> torch.Tensor:
     return torch.from_numpy(maze.observations[maze.free][::4])
 
 
-@pytest.mark.parametrize("method", PROPOSERS)
-def test_proposals_are_actions(
-    method: str, stitchers: dict[str, Stitcher], states: torch.Tensor
-) -> None:
-    stitcher = stitchers[method]
-    for n in (1, len(states)):
-        actions = stitcher.propose(states[:n], 0, 1, streams(n)).actions
-        steps = 4 if method == "mb-stitch" else 1
-        assert actions.shape == (n, steps, MOVES.size)
-        assert actions.dtype == np.float32
-        assert set(np.unique(actions)) == {0, 1}
-        assert (actions.sum(axis=2) == 1).all()
+class TestStitchers(StitcherConformance):
+    @pytest.fixture(
+        params=["random-stitch", "mf-stitch", "mb-stitch", "mb-stitch[execute=1]", "reach-stitch"]
+    )
+    def stitcher(self, request: pytest.FixtureRequest, stitchers: dict[str, Stitcher]) -> Stitcher:
+        return stitchers[request.param]
+
+    @pytest.fixture
+    def space(self, maze: Maze) -> ActionSpace:
+        return maze.actions
 
 
-@pytest.mark.parametrize("method", PROPOSERS)
-def test_a_proposal_belongs_to_its_stream_and_state(
-    method: str, stitchers: dict[str, Stitcher], states: torch.Tensor
+def test_as_many_actions_are_proposed_as_are_to_be_executed(
+    stitchers: dict[str, Stitcher], states: torch.Tensor
 ) -> None:
-    stitcher, n = stitchers[method], len(states)
-    together = stitcher.propose(states, 0, 1, streams(n)).actions
-    torch.manual_seed(0)
-    assert np.array_equal(stitcher.propose(states, 0, 1, streams(n)).actions, together)
-    for row in range(n):
-        alone = stitcher.propose(states[row : row + 1], 0, 1, [streams(n)[row]]).actions
-        assert np.array_equal(alone[0], together[row])
+    steps = {"random-stitch": 1, "mf-stitch": 1, "mb-stitch": 4, "mb-stitch[execute=1]": 1}
+    for method, expected in steps.items():
+        proposal = stitchers[method].propose(states, 0, 1, streams(len(states)))
+        assert proposal.actions.shape[1] == expected
 
 
 @pytest.mark.parametrize("method", DRAWING)

@@ -1,0 +1,70 @@
+"""What every stitcher must do."""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from stitching.envs.protocol import ActionSpace
+from stitching.methods.protocol import Proposal, Stitcher
+from stitching.streams import stream
+
+
+def streams(n: int) -> list[np.random.Generator]:
+    return [stream("conformance", i) for i in range(n)]
+
+
+def proposed(stitcher: Stitcher, states: Tensor) -> Proposal:
+    """From a skill's end to the next one."""
+    return stitcher.propose(states, 0, 1, streams(len(states)))
+
+
+class StitcherConformance:
+    """To be inherited from, with fixtures `stitcher`, `states` and `space`.
+
+    states (n, observation) are some that the stitcher may be asked about, at least two; space is
+    the actions of their benchmark. A stitcher that never takes a step has nothing to conform to.
+    """
+
+    def test_proposals_are_actions(
+        self, stitcher: Stitcher, states: Tensor, space: ActionSpace
+    ) -> None:
+        for n in (1, len(states)):
+            proposal = proposed(stitcher, states[:n])
+            assert proposal.actions.dtype == np.float32
+            assert proposal.actions.ndim == 3
+            assert len(proposal.actions) == n
+            assert proposal.actions.shape[1] >= 1
+            assert proposal.actions.shape[2] == space.size
+            assert proposal.wanted.dtype == bool
+            assert proposal.wanted.shape == (n,)
+            wanted = proposal.actions[proposal.wanted]
+            assert np.abs(wanted).max(initial=0) <= 1
+            if space.discrete:
+                assert set(np.unique(wanted)) <= {0, 1}
+                assert (wanted.sum(axis=2) == 1).all()
+
+    def test_a_stitch_has_a_limit(self, stitcher: Stitcher) -> None:
+        assert stitcher.limit >= 1
+
+    def test_a_proposal_belongs_to_its_stream_and_state(
+        self, stitcher: Stitcher, states: Tensor
+    ) -> None:
+        together = proposed(stitcher, states)
+        torch.manual_seed(0)
+        again = proposed(stitcher, states)
+        assert np.array_equal(again.actions, together.actions)
+        assert np.array_equal(again.wanted, together.wanted)
+        own = streams(len(states))
+        for row in range(len(states)):
+            alone = stitcher.propose(states[row : row + 1], 0, 1, [own[row]])
+            assert np.array_equal(alone.actions[0], together.actions[row])
+            assert alone.wanted[0] == together.wanted[row]
+
+    def test_the_global_state_of_chance_is_left_alone(
+        self, stitcher: Stitcher, states: Tensor
+    ) -> None:
+        before = torch.get_rng_state()
+        proposed(stitcher, states)
+        assert torch.equal(torch.get_rng_state(), before)

@@ -1,0 +1,79 @@
+"""The package of docs/extending.md: installed, tested, played and named as any other part."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+EXAMPLE = Path(__file__).parents[2] / "docs" / "example"
+METHODS = ("no-stitch", "hold-stitch", "mb-stitch", "mb-stitch[planner=hold-shooting]")
+NAMES = """
+import json
+from orchestrator.plan import make_plan
+from orchestrator.spec import load_spec
+plan = make_plan(load_spec("hold.toml", "smoke"))
+names = {node.method: task.key for (node, _), task in plan.tasks.items()}
+print(json.dumps(names | {"recipes": sorted(plan.recipes)}))
+"""
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the example's files and, in "site", the package as pip installs it."""
+    folder = tmp_path_factory.mktemp("example")
+    copy = shutil.copytree(EXAMPLE, folder / "source")
+    shutil.copy(EXAMPLE / "hold.toml", folder)
+    install = ["install", "--quiet", "--no-deps", "--no-build-isolation", "--target"]
+    run(folder, "-m", "pip", *install, str(folder / "site"), str(copy))
+    return folder
+
+
+def run(folder: Path, *command: str) -> str:
+    """Python with the package; what it prints."""
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(folder / "site"), *sys.path])}
+    done = subprocess.run(
+        [sys.executable, *command], cwd=folder, env=environment, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.ray
+def test_its_method_and_planner_are_played_through_ray(place: Path) -> None:
+    run(
+        place, "-m", "orchestrator.cli", "run", "hold.toml", "--scale", "smoke", "--out", "run",
+        "--store", "store", "--tracking-uri", "none", "--workers", "1",
+    )  # fmt: skip
+    episodes = pd.read_parquet(place / "run" / "episodes.parquet")
+    assert set(episodes["method"]) == set(METHODS)
+    segments = pd.read_parquet(place / "run" / "segments.parquet")
+    stitches = segments[segments["method"] == "hold-stitch"]["stitch_steps"]
+    assert stitches.max() >= 2
+    table = (place / "run" / "report" / "hold.md").read_text()
+    assert "Hold-Stitch" in table
+    assert "planner=hold-shooting" in table
+
+
+def test_its_own_tests_pass(place: Path) -> None:
+    run(place, "-m", "pytest", "-q", "-p", "no:cacheprovider", "source/test_hold_stitch.py")
+
+
+def test_an_edit_names_what_it_plays_anew_and_nothing_else(place: Path) -> None:
+    before = json.loads(run(place, "-c", NAMES))
+    module = place / "site" / "hold_stitch.py"
+    text = module.read_text()
+    assert "scores.argmax(dim=1)" in text
+    module.write_text(text.replace("scores.argmax(dim=1)", "scores.argmin(dim=1)"))
+    try:
+        after = json.loads(run(place, "-c", NAMES))
+    finally:
+        module.write_text(text)
+    assert before["recipes"] == after["recipes"]
+    changed = {name for name in before if before[name] != after[name]}
+    assert changed == {"hold-stitch", "mb-stitch[planner=hold-shooting]"}
