@@ -98,7 +98,7 @@ class Builds:
                 "kind": recipe.kind,
                 "params": recipe.params,
                 "inputs": recipe.inputs,
-                "seconds": round(report.seconds, 3),
+                "seconds": round(report.earlier_seconds + report.seconds, 3),
             }
             digest = self.store.write(recipe.kind, recipe.key, report.artifact, made)
             self.store.drop_checkpoints(recipe.key)

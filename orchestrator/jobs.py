@@ -94,5 +94,6 @@ class Report:
     artifact: Artifact | None = None
     blocks: tuple[BlockReport, ...] = ()
     seconds: float = 0.0
+    earlier_seconds: float = 0.0  # of attempts whose checkpoints a build went on from
     trouble: Trouble | None = None
     error: str = ""

@@ -13,6 +13,7 @@ import torch
 from orchestrator.builders import BUILDERS
 from orchestrator.builders.models import LOADERS
 from orchestrator.builders.parts import Inputs
+from orchestrator.checkpoints import Checkpoints
 from orchestrator.jobs import BlockReport, BlockTask, BuildJob, PlayJob, Report
 from orchestrator.ledger import Outcome
 from orchestrator.methods import method_block, method_of
@@ -22,7 +23,7 @@ from stitching.envs.protocol import EpisodeBlock
 from stitching.envs.registry import BENCHMARKS
 from stitching.methods.protocol import Models
 from stitching.models.agent import Agent
-from stitching.models.checkpoints import checkpoints_in
+from stitching.models.checkpoints import checkpoints_by
 from stitching.rollout import Play, begin, play_segment
 
 
@@ -34,14 +35,16 @@ def use_one_thread() -> None:
 def build(job: BuildJob, inputs: Inputs) -> Report:
     """Make an artifact; inputs by role. Trouble is reported, not raised."""
     started = time.perf_counter()
+    kept = Checkpoints(job.checkpoints)
     try:
-        with checkpoints_in(job.checkpoints):
+        with checkpoints_by(kept.of):
             artifact = BUILDERS[job.recipe.kind].make(job.recipe.params, inputs)
     except (DataError, FloatingPointError) as error:
         return Report(job, trouble="bad data", error=str(error))
     except Exception:
         return Report(job, trouble="failed", error=traceback.format_exc(limit=-3))
-    return Report(job, artifact=artifact, seconds=time.perf_counter() - started)
+    seconds = time.perf_counter() - started
+    return Report(job, artifact=artifact, seconds=seconds, earlier_seconds=kept.earlier)
 
 
 class BlockPlayer:

@@ -208,7 +208,8 @@ def train_iql(
     log = CurveLog(config.updates, config.log_every)
     rng = stream("batches", *labels)
     batches = minibatches(experience, mean, std, config.batch_size, rng, swapping, corrections)
-    changing = prefixed_tensors(q=q, q_target=q_target, v=v, policy=policy | {"log_std": log_std})
+    networks = {"q": q, "v": v, "policy": policy | {"log_std": log_std}}
+    changing = prefixed_tensors(q_target=q_target, **networks)
     training = Training(labels, changing, optimizer, rng, log, dropout=generator)
     for update in training.updates():
         if config.learning_rate_decay:
@@ -230,8 +231,8 @@ def train_iql(
         if corrections is not None:
             low, high = corrections.widened(low, high)
         weights |= {"observation_low": low, "observation_high": high}
-    for prefix, params in (("q", q), ("v", v), ("policy", policy | {"log_std": log_std})):
-        weights |= prefixed(params, prefix)
+    for name, params in networks.items():
+        weights |= prefixed(params, name)
     return Trained(weights, log.curves)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from stitching.models.checkpoints import Checkpoint
+from stitching.models.checkpoints import Checkpoint, checkpoint_of
 from stitching.streams import Label
 
 DRAWN_AT_ONCE = 256
@@ -70,10 +70,10 @@ class Training:
     def updates(self) -> Iterator[int]:
         """The numbers of the updates that are left, from the last checkpoint on.
 
-        Leaves a checkpoint about once a minute (see `checkpoints_in`). When one is left depends on
+        Leaves a checkpoint about once a minute (see `checkpoints_by`). When one is left depends on
         the clock; what comes out does not.
         """
-        checkpoint = Checkpoint.of(*self.labels)
+        checkpoint = checkpoint_of(self.labels)
         first = self._go_on(checkpoint) if checkpoint else 0
         kept = time.monotonic()
         for update in range(first, self.log.updates):

@@ -11,6 +11,7 @@ import pytest
 
 from orchestrator import reproduce as reproducing
 from orchestrator.building import Builds
+from orchestrator.checkpoints import CheckpointFile
 from orchestrator.errors import BadDataError, ChangedError, IncompleteError
 from orchestrator.executors.serial import SerialExecutor
 from orchestrator.jobs import ATTEMPTS, BuildJob, Job, Report
@@ -19,7 +20,6 @@ from orchestrator.progress import Silent
 from orchestrator.spec import Spec
 from orchestrator.store import Artifact
 from stitching.models import training
-from stitching.models.checkpoints import Checkpoint
 from tests.orchestrator.tiny import Counted, Lines, Place, promised_bytes
 
 
@@ -73,14 +73,14 @@ def test_trainings_leave_checkpoints_in_the_store_while_they_last(
     monkeypatch.setattr(training, "SECONDS_BETWEEN_CHECKPOINTS", 0.0)
     monkeypatch.setattr(training, "DRAWN_AT_ONCE", 1)
     kept: list[Path] = []
-    write = Checkpoint.write
+    write = CheckpointFile.write
 
-    def written(checkpoint: Checkpoint, tensors: Any, plain: Any) -> None:
+    def written(checkpoint: CheckpointFile, tensors: Any, plain: Any) -> None:
         write(checkpoint, tensors, plain)
         assert checkpoint.path.is_file()
         kept.append(checkpoint.path)
 
-    monkeypatch.setattr(Checkpoint, "write", written)
+    monkeypatch.setattr(CheckpointFile, "write", written)
     place.out.mkdir()
     executor = Checkpointed()
     Builds(plan, place.store, place.directory.ledger(), executor, Silent()).run(plan.needed, set())
@@ -103,7 +103,7 @@ def test_an_artifact_that_cannot_be_built(spec: Spec, plan: Plan, place: Place) 
 def test_a_damaged_artifact_is_named_set_aside_and_rebuilt(
     spec: Spec, plan: Plan, done: Place, expected: dict[str, bytes], counted: Counted
 ) -> None:
-    key = plan.agents[1]
+    key = plan.by_seed("agent")[1]
     file = done.store.path("agent", key) / "arrays.safetensors"
     content = bytearray(file.read_bytes())
     content[len(content) // 2] ^= 1
@@ -126,7 +126,7 @@ def test_an_artifact_with_other_bytes_than_the_blocks_were_played_with(
     spec: Spec, plan: Plan, done: Place
 ) -> None:
     """Whole, under the right name, but not what this run's ledger saw."""
-    key = plan.agents[0]
+    key = plan.by_seed("agent")[0]
     real = done.store.read("agent", key)
     arrays = {name: array + array.dtype.type(1) for name, array in real.arrays.items()}
     done.store.write("agent", key, Artifact(arrays, real.info), {"kind": "agent"})
@@ -139,7 +139,7 @@ def test_a_rebuilt_artifact_with_other_bytes(
     spec: Spec, plan: Plan, done: Place, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As on another kind of machine: the blocks so far do not belong to it."""
-    key = plan.dynamics[0]
+    key = plan.by_seed("dynamics")[0]
     done.store.discard("dynamics", key)
 
     class Other(SerialExecutor):

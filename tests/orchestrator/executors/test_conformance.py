@@ -94,7 +94,7 @@ def test_plays(executor: Executor, plan: Plan, finished: Place) -> None:
 
 
 def test_building_after_playing_and_playing_after_building(executor: Executor, plan: Plan) -> None:
-    play, build = alone(roots(plan)[0])[0], BuildJob(plan.recipes[plan.agents[0]])
+    play, build = alone(roots(plan)[0])[0], BuildJob(plan.recipes[plan.by_seed("agent")[0]])
     for report in reports(executor, [play, build]) + reports(executor, [build, play]):
         assert report.trouble is None
 
@@ -114,7 +114,7 @@ def test_a_block_that_fails_does_not_touch_the_others(executor: Executor, plan: 
 
 
 def test_a_build_that_fails(executor: Executor, plan: Plan) -> None:
-    good = plan.recipes[plan.agents[0]]
+    good = plan.recipes[plan.by_seed("agent")[0]]
     broken = Recipe("agent", good.params | {"config": {"updates": "many"}}, good.inputs)
     failed, done = reports(executor, [BuildJob(broken), BuildJob(good)])
     assert failed.trouble == "failed"
@@ -124,7 +124,7 @@ def test_a_build_that_fails(executor: Executor, plan: Plan) -> None:
 
 
 def test_a_build_on_bad_data(executor: Executor, plan: Plan, finished: Place) -> None:
-    good = plan.recipes[plan.agents[0]]
+    good = plan.recipes[plan.by_seed("agent")[0]]
     real = finished.store.read("maze-demonstrations", good.inputs["demonstrations"])
     observations = real.arrays["observations"].copy()
     observations[17, 2] = np.nan
@@ -144,7 +144,7 @@ def test_closing_drops_what_is_in_flight(
     for key, recipe in plan.recipes.items():
         executor.provide(key, finished.store.read(recipe.kind, key))
     endless = replace(roots(plan)[0], episodes=(0, 10**6))
-    for job in [*alone(endless, *roots(plan)), BuildJob(plan.recipes[plan.agents[0]])]:
+    for job in [*alone(endless, *roots(plan)), BuildJob(plan.recipes[plan.by_seed("agent")[0]])]:
         executor.submit(job)
     executor.close()
 

@@ -145,7 +145,7 @@ def test_what_waits_behind_a_killed_job_is_innocent(solo: Executor, plan: Plan) 
 
 
 def test_a_killed_build_is_a_lost_report(solo: Executor, plan: Plan) -> None:
-    recipe = plan.recipes[plan.agents[0]]
+    recipe = plan.recipes[plan.by_seed("agent")[0]]
     config = recipe.params["config"] | {"updates": 10**6}
     slow = replace(recipe, params=recipe.params | {"config": config})
     solo.submit(BuildJob(slow))

@@ -115,7 +115,7 @@ def test_the_report_shows_profiles_beside_the_paper_s(found: Path) -> None:
 def test_nothing_is_planned_that_neither_method_needs() -> None:
     plan = make_plan(search_spec(data_sweep()))
     assert plan.spec.methods == ("no-stitch", "random-stitch")
-    assert not plan.dynamics
+    assert not plan.by_seed("dynamics")
     assert not plan.illustrations
     assert {plan.recipes[key].kind for key in plan.needed} == {"kitchen-demonstrations", "agent"}
     assert len(plan.nodes) == 2 * (7 + 42)

@@ -10,10 +10,11 @@ import pytest
 import torch
 from torch import Tensor
 
+from orchestrator.checkpoints import Checkpoints
 from stitching.envs.maze import MAZE
 from stitching.envs.protocol import ActionSpace
 from stitching.models import training
-from stitching.models.checkpoints import Checkpoint, checkpoints_in
+from stitching.models.checkpoints import checkpoint_of, checkpoints_by
 from stitching.models.dynamics import DynamicsConfig, train_dynamics
 from stitching.models.iql import IQLConfig, train_iql, train_single_tasks
 from stitching.models.layers import parameters
@@ -86,7 +87,7 @@ def test_a_killed_training_goes_on_to_the_same_bytes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     expected = train()
-    with checkpoints_in(tmp_path / "own"):
+    with checkpoints_by(Checkpoints(tmp_path / "own").of):
         with monkeypatch.context() as patch:
             counted(patch, killed_after)
             with pytest.raises(Killed):
@@ -101,7 +102,7 @@ def test_a_killed_training_goes_on_to_the_same_bytes(
 def test_a_finished_training_is_not_done_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with checkpoints_in(tmp_path / "own"):
+    with checkpoints_by(Checkpoints(tmp_path / "own").of):
         first = agent()
         done = counted(monkeypatch)
         assert_same(agent(), first)
@@ -112,7 +113,7 @@ def test_a_finished_training_is_not_done_again(
 def test_a_damaged_checkpoint_counts_as_none(
     damage: bytes | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with checkpoints_in(tmp_path / "own"):
+    with checkpoints_by(Checkpoints(tmp_path / "own").of):
         expected = dynamics()
         (file,) = (tmp_path / "own").iterdir()
         content = bytearray(file.read_bytes())
@@ -124,9 +125,9 @@ def test_a_damaged_checkpoint_counts_as_none(
 
 
 def test_nothing_is_left_where_nobody_asked(tmp_path: Path) -> None:
-    assert Checkpoint.of("x") is None
-    with checkpoints_in(tmp_path / "not-there" / "own"):
-        assert Checkpoint.of("x") is None
+    assert checkpoint_of(("x",)) is None
+    with checkpoints_by(Checkpoints(tmp_path / "not-there" / "own").of):
+        assert checkpoint_of(("x",)) is None
         dynamics()
     assert list(tmp_path.iterdir()) == []
 
@@ -137,38 +138,51 @@ def test_a_folder_that_may_not_be_looked_into_counts_as_none(
     def refused(*_: object, **__: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    with checkpoints_in(tmp_path / "own"), monkeypatch.context() as patch:
+    with checkpoints_by(Checkpoints(tmp_path / "own").of), monkeypatch.context() as patch:
         patch.setattr(os, "stat", refused)
-        assert Checkpoint.of("x") is None
+        assert checkpoint_of(("x",)) is None
 
 
 def test_no_checkpoint_before_a_minute_is_over(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(training, "SECONDS_BETWEEN_CHECKPOINTS", 3600.0)
-    with checkpoints_in(tmp_path / "own"):
+    with checkpoints_by(Checkpoints(tmp_path / "own").of):
         dynamics()
     assert list(tmp_path.iterdir()) == []
 
 
 def test_other_machines_have_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with checkpoints_in(tmp_path / "own"):
-        here = Checkpoint.of("x")
-        monkeypatch.setattr(torch.backends.cpu, "get_cpu_capability", lambda: "ANOTHER")
-        assert Checkpoint.of("x") != here
+    kept = Checkpoints(tmp_path / "own")
+    here = kept.of(("x",))
+    monkeypatch.setattr(torch.backends.cpu, "get_cpu_capability", lambda: "ANOTHER")
+    assert kept.of(("x",)) != here
 
 
 def test_a_folder_that_takes_nothing_costs_the_checkpoint_alone(tmp_path: Path) -> None:
     (tmp_path / "own").write_text("a file where the folder should be")
     expected = dynamics()
-    with checkpoints_in(tmp_path / "own"):
+    with checkpoints_by(Checkpoints(tmp_path / "own").of):
         assert_same(dynamics(), expected)
 
 
 def test_trainings_of_other_labels_have_their_own(tmp_path: Path) -> None:
-    with checkpoints_in(tmp_path / "own"):
-        first, other = Checkpoint.of("agent", 0), Checkpoint.of("agent", 1)
-        assert first is not None
-        assert first != other
-        assert first == Checkpoint.of("agent", 0)
-        assert first == Checkpoint.of("agent", np.int64(0))  # type: ignore[arg-type]
+    kept = Checkpoints(tmp_path / "own")
+    first = kept.of(("agent", 0))
+    assert first is not None
+    assert first != kept.of(("agent", 1))
+    assert first == kept.of(("agent", 0))
+    assert first == kept.of(("agent", np.int64(0)))  # type: ignore[arg-type]
+
+
+def test_what_earlier_attempts_took_is_counted(tmp_path: Path) -> None:
+    first = Checkpoints(tmp_path / "own")
+    first._started -= 100.0
+    with checkpoints_by(first.of):
+        dynamics()
+    assert first.earlier == 0.0
+    second = Checkpoints(tmp_path / "own")
+    with checkpoints_by(second.of):
+        dynamics()
+    assert second.earlier >= 100.0
+    assert second.spent >= second.earlier
