@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from analysis.paper import HALF_DIGIT, accomplished_skills, paper_table
+from analysis.results import SCALES
 from analysis.tables import Table
 
 NEAR = 0.05
@@ -31,7 +32,7 @@ EXPLANATION = (
     f"accomplished skills is judged without an interval: it “{HOLDS}” if our numbers lie within "
     f"{SAME_SKILLS} of each other at all lengths, and else “{FAILS}”."
 )
-SMOKE = "smoke"
+SMOKE = SCALES[0]
 SMOKE_EXPLANATION = (
     "The smoke scale shows that everything runs. Its models are hardly trained and its episodes "
     "few, so it is not judged by the paper's numbers."

@@ -18,7 +18,7 @@ from orchestrator.structure import Plain
 
 METHOD_PACKAGE = "stitching"
 # Whose versions may change the bytes of any result.
-NUMERIC_PACKAGES = ("gymnasium-robotics", "mujoco", "numpy", "scipy", "torch")
+NUMERIC_PACKAGES = ("gymnasium-robotics", "mujoco", "numpy", "robosuite", "scipy", "torch")
 
 
 def canonical(plain: Any) -> str:

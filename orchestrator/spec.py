@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
-from importlib import resources
 from itertools import permutations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +16,7 @@ from orchestrator.errors import UsageError
 from orchestrator.kits import KITS, DataConfig
 from orchestrator.methods import SHARED, method_name, method_of, parse_method
 from orchestrator.structure import Plain, merged, nested, settings_of, structure, to_plain
-from orchestrator.tomls import Scale, based_fields, read_toml, toml_names
+from orchestrator.tomls import PACKAGED, Scale, based_fields, read_toml
 from stitching.bounds import Bounded, Count, Episodes, Few, Seed
 from stitching.envs.registry import BENCHMARKS
 from stitching.methods.no_stitch import NO_STITCH
@@ -209,13 +208,6 @@ def _check_demonstrated(spec: Spec, where: str) -> None:
     """Whether there can be demonstrations of a long task that nobody cut."""
     if not KITS[spec.benchmark].long_horizon(spec.data):
         raise UsageError(f"{where}: these data of {spec.benchmark} demonstrate no long task")
-
-
-PACKAGED = resources.files("orchestrator.specs")
-
-
-def packaged_specs() -> list[str]:
-    return toml_names(PACKAGED)
 
 
 def load_spec(name_or_file: str, scale: Scale = "paper") -> Spec:

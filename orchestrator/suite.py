@@ -11,7 +11,6 @@ from analysis.run import plain_label
 from orchestrator.errors import UsageError
 from orchestrator.rundir import RunDirectory
 from orchestrator.spec import (
-    PACKAGED,
     Spec,
     TableSpec,
     check_names,
@@ -21,7 +20,7 @@ from orchestrator.spec import (
     spec_from_plain,
 )
 from orchestrator.structure import Plain, merged, structure, to_plain
-from orchestrator.tomls import Scale, based_fields, check_scales, read_toml
+from orchestrator.tomls import PACKAGED, Scale, based_fields, check_scales, read_toml
 
 OWN_FIELDS = ("name", "title", "parts", "tables", "skill_labels")  # all others are the parts'
 NOT_OF_A_PART = ("name", "title", "scale", "tables")

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import tomllib
+from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 from orchestrator.errors import UsageError
 from orchestrator.structure import Plain, merged
+
+PACKAGED = resources.files("orchestrator.specs")
 
 Scale = Literal["smoke", "quick", "standard", "paper"]
 
@@ -17,6 +20,11 @@ def toml_names(packaged: Traversable) -> list[str]:
     """Names of the TOML files in a packaged folder, sorted."""
     files = (entry.name for entry in packaged.iterdir())
     return sorted(name.removesuffix(".toml") for name in files if name.endswith(".toml"))
+
+
+def packaged_specs() -> list[str]:
+    """Names of the specs that come with the code."""
+    return toml_names(PACKAGED)
 
 
 def load_toml(

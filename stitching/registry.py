@@ -21,10 +21,14 @@ T = TypeVar("T")
 NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
 
+class PartError(ImportError):
+    """A part of another package cannot be used."""
+
+
 def with_installed(group: str, own: Mapping[str, T], fits: Callable[[Any], bool]) -> dict[str, T]:
     """`own` parts by name, and after them those of an entry point group for which `fits` holds.
 
-    Raises ImportError, naming package and entry point, where a part of another package cannot be
+    Raises PartError, naming package and entry point, where a part of another package cannot be
     loaded, does not fit, or has a name that is taken or cannot be made a field's.
     """
     parts = dict(own)
@@ -32,12 +36,12 @@ def with_installed(group: str, own: Mapping[str, T], fits: Callable[[Any], bool]
         package = point.dist.name if point.dist is not None else "an installed package"
         where = f"{package}, entry point {point.name!r} of {group}"
         if not NAME.fullmatch(point.name):
-            raise ImportError(f"{where}: names have small letters, digits and '-' between words")
+            raise PartError(f"{where}: names have small letters, digits and '-' between words")
         if point.name in parts:
-            raise ImportError(f"{where}: this name is taken")
+            raise PartError(f"{where}: this name is taken")
         part = _load(point, where)
         if not fits(part):
-            raise ImportError(f"{where}: {point.value} is not what {group} are: docs/extending.md")
+            raise PartError(f"{where}: {point.value} is not what {group} are: docs/extending.md")
         parts[point.name] = part
     return parts
 
@@ -46,7 +50,7 @@ def _load(point: EntryPoint, where: str) -> Any:
     try:
         return point.load()
     except Exception as error:
-        raise ImportError(f"{where}: {type(error).__name__}: {error}") from error
+        raise PartError(f"{where}: {type(error).__name__}: {error}") from error
 
 
 def field_name(part: str) -> str:

@@ -323,6 +323,22 @@ def test_an_interrupt_is_130(cli: Cli, trained: Place) -> None:
 # The other commands
 
 
+@pytest.mark.parametrize("word", ["--help", "--version", "doktor"])
+def test_an_answer_that_needs_no_simulator_imports_none(word: str) -> None:
+    heavy = "torch", "mujoco", "ray", "pandas", "numpy", "mlflow", "optuna", "robosuite"
+    code = f"""
+import sys
+from orchestrator.cli import main
+try:
+    main([{word!r}])
+except SystemExit:
+    pass
+print(sorted(set({heavy!r}) & sys.modules.keys()))
+"""
+    asked = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert asked.stdout.splitlines()[-1] == "[]", asked.stderr
+
+
 def test_output_that_nobody_reads_is_no_error() -> None:
     command = [sys.executable, "-m", "orchestrator.cli", "run", "--help"]
     unread = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

@@ -5,6 +5,8 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pandas as pd
@@ -33,14 +35,31 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def run(folder: Path, *command: str) -> str:
-    """Python with the package; what it prints."""
+def called(folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
+    """Python with the package."""
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(folder / "site"), *sys.path])}
-    done = subprocess.run(
+    return subprocess.run(
         [sys.executable, *command], cwd=folder, env=environment, capture_output=True, text=True
     )
+
+
+def run(folder: Path, *command: str) -> str:
+    """What it prints."""
+    done = called(folder, *command)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
+
+
+@contextmanager
+def edited(folder: Path, old: str, new: str) -> Iterator[None]:
+    module = folder / "site" / "hold_stitch.py"
+    text = module.read_text()
+    assert old in text
+    module.write_text(text.replace(old, new, 1))
+    try:
+        yield
+    finally:
+        module.write_text(text)
 
 
 @pytest.mark.slow
@@ -66,14 +85,17 @@ def test_its_own_tests_pass(place: Path) -> None:
 
 def test_an_edit_names_what_it_plays_anew_and_nothing_else(place: Path) -> None:
     before = json.loads(run(place, "-c", NAMES))
-    module = place / "site" / "hold_stitch.py"
-    text = module.read_text()
-    assert "scores.argmax(dim=1)" in text
-    module.write_text(text.replace("scores.argmax(dim=1)", "scores.argmin(dim=1)"))
-    try:
+    with edited(place, "scores.argmax(dim=1)", "scores.argmin(dim=1)"):
         after = json.loads(run(place, "-c", NAMES))
-    finally:
-        module.write_text(text)
     assert before["recipes"] == after["recipes"]
     changed = {name for name in before if before[name] != after[name]}
     assert changed == {"hold-stitch", "mb-stitch[planner=hold-shooting]"}
+
+
+def test_a_package_that_cannot_be_used_is_named(place: Path) -> None:
+    with edited(place, "import annotations\n", "import annotations\nimport no_such_module\n"):
+        failed = called(place, "-m", "orchestrator.cli", "plan", "table1", "--scale", "smoke")
+    assert failed.returncode == 2
+    assert len(failed.stderr.splitlines()) == 1
+    assert "error: skillstitch-example, entry point 'hold-s" in failed.stderr
+    assert "No module named 'no_such_module'; mend or uninstall it" in failed.stderr

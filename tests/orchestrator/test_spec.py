@@ -9,10 +9,10 @@ import pytest
 
 from orchestrator.errors import UsageError
 from orchestrator.methods import method_label
-from orchestrator.spec import differences, load_spec, packaged_specs, spec_from_plain
+from orchestrator.spec import differences, load_spec, spec_from_plain
 from orchestrator.structure import to_plain
 from orchestrator.suite import Suite, load_asked
-from orchestrator.tomls import Scale
+from orchestrator.tomls import Scale, packaged_specs
 from stitching.methods.mb_stitch import MBStitchSettings
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from stitching.registry import field_name, sections, with_installed
+from stitching.registry import PartError, field_name, sections, with_installed
 
 GROUP = "skillstitch.test-parts"
 OWN = {"one": 1}
@@ -48,7 +48,7 @@ def test_parts_of_other_packages_follow_our_own(folder: Path) -> None:
 )
 def test_what_cannot_be_a_part_is_refused(folder: Path, line: str, message: str) -> None:
     installed(folder, line)
-    with pytest.raises(ImportError, match=f"some-parts, entry point .*{message}"):
+    with pytest.raises(PartError, match=f"some-parts, entry point .*{message}"):
         with_installed(GROUP, OWN, is_number)
 
 

@@ -1,0 +1,163 @@
+"""The commands that take a spec: its fields are their options."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+from rich.console import Console
+
+from orchestrator.errors import IncompleteError, UsageError, said_to_users
+from orchestrator.executors import ExecutorKind
+from orchestrator.spec import Spec
+from orchestrator.store import USUAL_STORE
+from orchestrator.suite import Suite, load_asked, with_specs
+from orchestrator.tomls import packaged_specs
+
+OfSpec = Annotated[Spec, tyro.conf.arg(name="")]  # spec fields are options of the command itself
+
+
+@dataclass(frozen=True)
+class PlanCommand:
+    """What a spec would train and simulate, and what that costs. Runs nothing."""
+
+    spec: OfSpec
+    store: Path = USUAL_STORE  # where artifacts and finished blocks are kept
+    workers: int | None = None  # to estimate the time for; default: all cores
+    from_sweep: str | None = None  # take a finished sweep's winner: its name or directory
+
+
+@dataclass(frozen=True)
+class RunCommand:
+    """Carry a spec out, or go on where it was interrupted; ends with tables and report."""
+
+    spec: OfSpec
+    out: Path | None = None  # run directory; default: runs/<name>-<scale>
+    store: Path = USUAL_STORE  # where artifacts and finished blocks are kept
+    executor: ExecutorKind = "ray"  # serial: everything in this process
+    workers: int | None = None  # default: all cores, or all of the cluster's
+    address: str | None = None  # of a Ray cluster to join, e.g. 10.0.0.1:6379 or auto
+    tracking_uri: str | None = None  # MLflow; default: SQLite beside the store; none: off
+    results: Path | None = None  # also export each table to RESULTS/<table>/
+    force: bool = False  # let the exported tables replace larger ones
+    from_sweep: str | None = None  # take a finished sweep's winner: its name or directory
+
+
+def _with_spec(command: type[Any], name: str, words: list[str]) -> tuple[Any, Spec | Suite]:
+    """Parse `SPEC [options]`; every field of the spec is an option, its default the spec's own.
+
+    The fields of a suite's parts differ: the same words are read for each of them.
+    """
+    program = f"skillstitch {name} SPEC"
+    if not words or words[0].startswith("-"):
+        if words and words[0] in ("-h", "--help"):
+            words = [packaged_specs()[0], "--help"]
+        else:
+            raise UsageError(f"skillstitch {name} needs a spec: {', '.join(packaged_specs())}")
+    scale: Any = _option(words, "--scale") or "paper"
+    asked = load_asked(words[0], scale)
+    specs = [part.spec for part in asked.parts] if isinstance(asked, Suite) else [asked]
+    if sweep := _option(words, "--from-sweep"):
+        from sweeps.winner import with_winner
+
+        specs = [with_winner(spec, sweep) for spec in specs]
+    commands = []
+    for spec in specs:
+        try:
+            commands.append(tyro.cli(command, default=command(spec), args=words[1:], prog=program))
+        except SystemExit as end:
+            if end.code and len(specs) > 1:
+                raise UsageError(f"options apply to every part; so read for {spec.name}") from None
+            raise
+    if isinstance(asked, Suite):
+        return commands[0], with_specs(asked, [each.spec for each in commands])
+    return commands[0], commands[0].spec
+
+
+def _option(words: list[str], name: str) -> str:
+    """The value of an option that decides the defaults of all others."""
+    value = ""
+    for word, following in zip(words, [*words[1:], ""], strict=True):
+        if word == name:
+            value = following
+        elif word.startswith(f"{name}="):
+            value = word.partition("=")[2]
+    return value
+
+
+def plan(words: list[str], output: Console) -> None:
+    """`skillstitch plan SPEC [options]`."""
+    from orchestrator.costs import estimate
+    from orchestrator.ledger import Ledger
+    from orchestrator.plan import make_plan
+    from orchestrator.printing import forecast_lines, plan_lines, suite_plan_lines
+    from orchestrator.reproduce import check_workers
+    from orchestrator.store import Store
+
+    command, asked = _with_spec(PlanCommand, "plan", words)
+    check_workers(command.workers)
+    if isinstance(asked, Suite):
+        lines = suite_plan_lines(asked, command.store, command.workers)
+    else:
+        made, store = make_plan(asked), Store(command.store)
+        costs = estimate(made, store, Ledger.look(command.store / "blocks.sqlite"))
+        lines = chain(plan_lines(asked, costs, command.workers), forecast_lines(made, store))
+    for line in lines:
+        output.print(line, markup=False)
+
+
+def run(words: list[str], output: Console, errors: Console) -> None:
+    """`skillstitch run SPEC [options]`."""
+    from orchestrator.printing import summary_lines
+    from orchestrator.progress import ConsoleProgress
+    from orchestrator.reproduce import Settings, reproduce
+    from orchestrator.reproduce_suite import reproduce_suite
+    from orchestrator.rundir import RunDirectory, default_out
+
+    command, asked = _with_spec(RunCommand, "run", words)
+    out = command.out or default_out(asked)
+    settings = Settings(
+        out,
+        command.store,
+        command.executor,
+        command.workers,
+        command.address,
+        command.tracking_uri,
+    )
+    if command.results is not None:
+        from analysis.results import check_results
+
+        with said_to_users():
+            names = [table.id for table in asked.tables]
+            check_results(command.results, names, asked.extent, command.force)
+    incomplete = None
+    with ConsoleProgress(errors) as progress:
+        try:
+            if isinstance(asked, Suite):
+                reproduce_suite(asked, settings, progress)
+            else:
+                reproduce(asked, settings, progress)
+        except IncompleteError as error:
+            if not (out / "finished").is_file():
+                raise
+            incomplete = error
+    if command.results is not None:
+        export(out, command.results, output, force=command.force)
+    for line in summary_lines(RunDirectory(out)):
+        output.print(line, markup=False)
+    if incomplete is not None:
+        raise incomplete
+
+
+def export(run: Path, results: Path, output: Console, *, force: bool) -> None:
+    """Copy a run's tables, figures and report to RESULTS/<table>/."""
+    from analysis.report import export_results
+    from orchestrator.rundir import RunDirectory
+
+    with RunDirectory(run).locked(), said_to_users():
+        folders = export_results(run, results, force=force)
+    for folder in folders:
+        output.print(f"exported {folder}", markup=False)
