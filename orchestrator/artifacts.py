@@ -8,13 +8,13 @@ from functools import cached_property
 from itertools import chain, pairwise
 from typing import TypeVar
 
+from orchestrator.benchmarks.kit import TEACHING, Dataset, Illustration
+from orchestrator.benchmarks.registry import BENCHMARKS, KITS
 from orchestrator.errors import UsageError
-from orchestrator.kits import KITS, TEACHING, Dataset, Illustration
 from orchestrator.methods import SHARED, deciding, method_of
 from orchestrator.recipes import Recipe
 from orchestrator.spec import Spec
 from orchestrator.structure import Plain, to_plain
-from stitching.envs.registry import BENCHMARKS
 from stitching.methods.mb_stitch import MB_STITCH
 from stitching.methods.mf_stitch import MFStitchSettings
 from stitching.methods.no_stitch import NO_STITCH

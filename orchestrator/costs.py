@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from orchestrator.benchmarks.registry import KITS
 from orchestrator.jobs import BlockTask
-from orchestrator.kits import KITS
 from orchestrator.ledger import Ledger, Played
 from orchestrator.methods import method_rollout
 from orchestrator.plan import Node, Plan

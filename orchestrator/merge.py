@@ -10,8 +10,8 @@ from typing import Any
 import pandas as pd
 
 from analysis.run import SEPARATOR, VARIANT, plain_label
+from orchestrator.benchmarks.registry import KITS
 from orchestrator.errors import UsageError
-from orchestrator.kits import KITS
 from orchestrator.methods import first_method, method_label, method_of
 from orchestrator.rundir import RunDirectory
 from orchestrator.structure import Plain, to_plain

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from orchestrator.artifacts import Artifacts
-from orchestrator.builders import BLOCK_CODE, BLOCK_SETUP
+from orchestrator.builders.registry import BLOCK_CODE, BLOCK_SETUP
 from orchestrator.jobs import BlockTask
 from orchestrator.methods import (
     SHARED,

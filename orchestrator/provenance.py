@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from datetime import UTC, datetime
 from pathlib import Path
 
-from orchestrator.builders import BLOCK_CODE, BLOCK_SETUP, BUILDERS
+from orchestrator.builders.registry import BLOCK_CODE, BLOCK_SETUP, BUILDERS
 from orchestrator.cores import usable_cores
 from orchestrator.recipes import NUMERIC_PACKAGES, code_fingerprint
 from orchestrator.structure import Plain

@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from orchestrator.builders import BUILDERS
+from orchestrator.builders.registry import BUILDERS
 from orchestrator.structure import Plain
 
 METHOD_PACKAGE = "stitching"

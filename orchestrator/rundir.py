@@ -12,8 +12,8 @@ from typing import Any, Protocol
 
 import analysis
 from orchestrator import locking
+from orchestrator.benchmarks.registry import KITS
 from orchestrator.errors import ChangedError, UsageError
-from orchestrator.kits import KITS
 from orchestrator.ledger import Ledger
 from orchestrator.methods import first_method, method_label, method_of
 from orchestrator.plan import make_plan

@@ -7,18 +7,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, fields
 from itertools import permutations
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Union
 
 import tyro
 
 from analysis.rows import ROW_RULES
+from orchestrator.benchmarks.registry import BENCHMARKS, KITS
 from orchestrator.errors import UsageError
-from orchestrator.kits import KITS, DataConfig
 from orchestrator.methods import SHARED, method_name, method_of, parse_method
 from orchestrator.structure import Plain, merged, nested, settings_of, structure, to_plain
 from orchestrator.tomls import PACKAGED, Scale, based_fields, read_toml
 from stitching.bounds import Bounded, Count, Episodes, Few, Seed
-from stitching.envs.registry import BENCHMARKS
 from stitching.methods.no_stitch import NO_STITCH
 from stitching.methods.protocol import MethodSettings
 from stitching.methods.registry import METHODS
@@ -43,6 +42,7 @@ class TableSpec:
 
 
 if TYPE_CHECKING:
+    DataSettings = Any
 
     class MethodSections(Bounded):
         """A field for the settings of each method: `mb_stitch`, `reach_stitch`."""
@@ -50,6 +50,7 @@ if TYPE_CHECKING:
         def __getattr__(self, name: str) -> Any: ...
 
 else:
+    DataSettings = Union[tuple(dict.fromkeys(kit.data for kit in KITS.values()))]  # noqa: UP007
     with_settings = {name: one.settings for name, one in METHODS.items() if fields(one.settings)}
     MethodSections = sections("MethodSections", with_settings)
 
@@ -64,7 +65,7 @@ class Spec(MethodSections):
     name: str
     title: str
     benchmark: str
-    data: tyro.conf.AvoidSubcommands[DataConfig]
+    data: tyro.conf.AvoidSubcommands[DataSettings]  # of the benchmark
     scale: Scale = "paper"
     lengths: tuple[Few, ...] = ()  # all permutations of these many skills
     tasks: tuple[str, ...] = ()  # and these tasks, as "a>b>c"

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 import torch
 
-from orchestrator.builders import BUILDERS
+from orchestrator.benchmarks.registry import BENCHMARKS
 from orchestrator.builders.models import LOADERS
 from orchestrator.builders.parts import Inputs
+from orchestrator.builders.registry import BUILDERS
 from orchestrator.checkpoints import Checkpoints
 from orchestrator.jobs import BlockReport, BlockTask, BuildJob, PlayJob, Report
 from orchestrator.ledger import Outcome
@@ -20,7 +21,6 @@ from orchestrator.methods import method_block, method_of
 from orchestrator.store import Artifact
 from stitching.data.transitions import DataError
 from stitching.envs.protocol import EpisodeBlock
-from stitching.envs.registry import BENCHMARKS
 from stitching.methods.protocol import Models
 from stitching.models.agent import Agent
 from stitching.models.checkpoints import checkpoints_by

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from orchestrator.benchmarks.registry import BENCHMARKS
 from orchestrator.builders.parts import Builder, Inputs
 from orchestrator.store import Artifact
 from orchestrator.structure import Plain, structure
@@ -15,9 +16,9 @@ from stitching.data.initiation import initiation_set, pose_scale
 from stitching.data.mixtures import mixed_experience, skill_pairs
 from stitching.data.swapping import Swapping
 from stitching.data.transitions import Transitions, check, concatenate
+from stitching.data.uncut import uncut_experience
 from stitching.envs.factors import Factors
 from stitching.envs.protocol import Benchmark, conditions
-from stitching.envs.registry import BENCHMARKS
 from stitching.models.agent import own_weights
 from stitching.models.dynamics import DynamicsConfig, train_dynamics
 from stitching.models.iql import IQLConfig, train_iql, train_single_tasks
@@ -107,6 +108,18 @@ def _averaged(curves: Curves) -> Curves:
     }
 
 
+def _single_policy(params: Plain, inputs: Inputs) -> Artifact:
+    benchmark = BENCHMARKS[params["benchmark"]]
+    config = structure(IQLConfig, params["config"], "single_policy.training")
+    columns = dict(inputs["long-horizon"].arrays)
+    rewards = columns.pop("rewards")
+    data = Transitions(**columns)
+    check(data, benchmark, source="long-horizon")
+    experience = uncut_experience(data, rewards)
+    labels = _labels("single-policy", params)
+    return _trained(train_iql(experience, benchmark.actions, config, *labels))
+
+
 def _dynamics(params: Plain, inputs: Inputs) -> Artifact:
     _, data = _checked_data(params, inputs)
     config = structure(DynamicsConfig, params["config"], "dynamics")
@@ -136,6 +149,9 @@ MIXED = (*LEARNING, "stitching.data.mixtures", "stitching.models.agent")
 TRAINING_BUILDERS = {
     "agent": Builder(_agent, LEARNING, SETUP),
     "mf-policy": Builder(_mf_policy, MIXED, SETUP),
+    "single-policy": Builder(
+        _single_policy, ("stitching.models.iql", "stitching.data.uncut"), SETUP
+    ),
     "initiation-sets": Builder(_initiation_sets, ("stitching.data.initiation",), SETUP),
     "dynamics": Builder(_dynamics, ("stitching.models.dynamics",), SETUP),
 }

@@ -1,4 +1,4 @@
-"""What every planner and every stitcher must do, as tests to inherit from; they need pytest.
+"""What every benchmark, planner and stitcher must do, as tests to inherit from; they need pytest.
 
 class TestMyPlanner(PlannerConformance):
     @pytest.fixture
@@ -12,4 +12,5 @@ class TestMyPlanner(PlannerConformance):
 
 import pytest
 
-pytest.register_assert_rewrite("stitching.testing.planners", "stitching.testing.stitchers")
+for part in ("benchmarks", "planners", "stitchers"):
+    pytest.register_assert_rewrite(f"stitching.testing.{part}")

@@ -18,7 +18,7 @@ NAMES = """
 import json
 from orchestrator.plan import make_plan
 from orchestrator.spec import load_spec
-plan = make_plan(load_spec("hold.toml", "smoke"))
+plan = make_plan(load_spec("track.toml", "smoke"))
 names = {node.method: task.key for (node, _), task in plan.tasks.items()}
 print(json.dumps(names | {"recipes": sorted(plan.recipes)}))
 """
@@ -29,7 +29,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the example's files and, in "site", the package as pip installs it."""
     folder = tmp_path_factory.mktemp("example")
     copy = shutil.copytree(EXAMPLE, folder / "source")
-    shutil.copy(EXAMPLE / "hold.toml", folder)
+    shutil.copy(EXAMPLE / "track.toml", folder)
     install = ["install", "--quiet", "--no-deps", "--no-build-isolation", "--target"]
     run(folder, "-m", "pip", *install, str(folder / "site"), str(copy))
     return folder
@@ -64,23 +64,23 @@ def edited(folder: Path, old: str, new: str) -> Iterator[None]:
 
 @pytest.mark.slow
 @pytest.mark.ray
-def test_its_method_and_planner_are_played_through_ray(place: Path) -> None:
+def test_a_table_of_its_own_parts_is_played_through_ray(place: Path) -> None:
     run(
-        place, "-m", "orchestrator.cli", "run", "hold.toml", "--scale", "smoke", "--out", "run",
+        place, "-m", "orchestrator.cli", "run", "track.toml", "--scale", "smoke", "--out", "run",
         "--store", "store", "--tracking-uri", "none", "--workers", "1",
     )  # fmt: skip
     episodes = pd.read_parquet(place / "run" / "episodes.parquet")
     assert set(episodes["method"]) == set(METHODS)
+    assert set(episodes["task"]) >= {"left>middle", "right>left"}
     segments = pd.read_parquet(place / "run" / "segments.parquet")
-    stitches = segments[segments["method"] == "hold-stitch"]["stitch_steps"]
-    assert stitches.max() >= 2
-    table = (place / "run" / "report" / "hold.md").read_text()
+    assert segments["stitch_steps"][segments["method"] == "hold-stitch"].max() >= 3
+    table = (place / "run" / "report" / "track.md").read_text()
     assert "Hold-Stitch" in table
     assert "planner=hold-shooting" in table
 
 
 def test_its_own_tests_pass(place: Path) -> None:
-    run(place, "-m", "pytest", "-q", "-p", "no:cacheprovider", "source/test_hold_stitch.py")
+    run(place, "-m", "pytest", "-q", "-p", "no:cacheprovider", "source")
 
 
 def test_an_edit_names_what_it_plays_anew_and_nothing_else(place: Path) -> None:

@@ -55,7 +55,7 @@ def spec() -> Spec:
 
 def carried_out(spec: Spec, place: Place) -> tuple[Plan, Place]:
     with pytest.MonkeyPatch.context() as patch:
-        for module in ("orchestrator.kits", "stitching.data.kitchen.demonstrations"):
+        for module in ("orchestrator.benchmarks.kitchen", "stitching.data.kitchen.demonstrations"):
             patch.setattr(f"{module}.orders", lambda config: (ORDER,))
         place.carry_out(spec)
         return make_plan(spec), place

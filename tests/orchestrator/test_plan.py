@@ -6,7 +6,8 @@ from typing import get_args
 
 import pytest
 
-from orchestrator.builders import BLOCK_CODE, BLOCK_SETUP
+from orchestrator.benchmarks.registry import BENCHMARKS
+from orchestrator.builders.registry import BLOCK_CODE, BLOCK_SETUP
 from orchestrator.methods import first_method
 from orchestrator.plan import Node, Plan, make_plan
 from orchestrator.recipes import _closure
@@ -14,7 +15,6 @@ from orchestrator.spec import Spec, load_spec
 from stitching.data.mixtures import Mixture
 from stitching.envs.kitchen import KITCHEN
 from stitching.envs.maze import MAZE
-from stitching.envs.registry import BENCHMARKS
 from stitching.rollout import RolloutConfig
 
 

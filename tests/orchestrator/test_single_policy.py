@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from analysis.paper import paper_table
+from orchestrator.benchmarks.registry import KITS
 from orchestrator.errors import UsageError
-from orchestrator.kits import KITS
 from orchestrator.plan import Plan, make_plan
 from orchestrator.rundir import describe
 from orchestrator.spec import Spec, load_spec

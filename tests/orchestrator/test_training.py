@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import torch
 
-from orchestrator.builders import BUILDERS
 from orchestrator.builders.models import load_models
 from orchestrator.builders.parts import as_artifact
+from orchestrator.builders.registry import BUILDERS
 from orchestrator.store import Artifact
 from orchestrator.structure import to_plain
 from stitching.data.maze import MazeDataConfig, skill_demonstrations

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from unittest import mock
 
+from orchestrator.benchmarks.registry import BENCHMARKS
 from orchestrator.builders.models import load_models
 from orchestrator.executors.serial import SerialExecutor
 from orchestrator.jobs import BuildJob, Job
@@ -24,7 +25,6 @@ from orchestrator.reproduce import Settings, reproduce
 from orchestrator.rundir import RunDirectory
 from orchestrator.spec import Spec, load_spec
 from orchestrator.store import Store
-from stitching.envs.registry import BENCHMARKS
 from stitching.models.agent import Agent
 from stitching.rollout import Play, Segments, play_from_start
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.builders import BUILDERS
+from orchestrator.benchmarks.registry import KITS
+from orchestrator.builders.registry import BUILDERS
 from orchestrator.errors import UsageError
-from orchestrator.kits import KITS
 from orchestrator.plan import Plan, make_plan
 from orchestrator.rundir import describe
 from orchestrator.spec import Spec, load_spec

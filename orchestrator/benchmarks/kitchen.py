@@ -1,0 +1,95 @@
+"""What is to be known of Kitchen."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+from orchestrator.benchmarks.kit import Costs, Dataset, Kit, physics_illustrations
+from orchestrator.builders.kitchen import KITCHEN_BUILDERS
+from orchestrator.builders.long_horizon import LONG_HORIZON_BUILDERS
+from orchestrator.builders.studies import Studies
+from orchestrator.errors import UsageError
+from stitching.data.kitchen.demonstrations import KitchenDataConfig, Order, orders
+from stitching.envs.kitchen import GROUPS, KITCHEN
+
+
+def _datasets(config: KitchenDataConfig) -> dict[str, Dataset]:
+    """One artifact an order, so that they are collected in parallel."""
+    if config.source == "human":
+        if config.human.endswith(".npz") and not Path(config.human).is_file():
+            raise UsageError(f"data.human: no file {config.human}")
+        if not config.human:
+            raise UsageError(
+                "data.human: name an .npz file or a Minari dataset, as D4RL/kitchen/complete-v2"
+            )
+        return {"demonstrations": Dataset("kitchen-human", {"sha256": _sha256(config.human)})}
+    return {
+        f"demonstrations-{short_order(order)}": Dataset("kitchen-demonstrations", {"order": order})
+        for order in orders(config)
+    }
+
+
+def _long_horizon(config: KitchenDataConfig) -> str:
+    """People's recordings do not hold any one task often enough."""
+    return "" if config.source == "human" else "kitchen-long-horizon"
+
+
+def _label(config: KitchenDataConfig) -> str:
+    return {
+        "orders": "",
+        "single-skill": "data: each skill alone, from the start pose",
+        "human": f"data: people's demonstrations, {Path(config.human).name}",
+    }[config.source]
+
+
+def short_order(order: Order) -> str:
+    """ "microwave-bottom-top-slide": as the human orders are written."""
+    return "-".join(name.split()[0] for name in order)
+
+
+def _sha256(file: str) -> str:
+    """Of a local file, so that another content is another dataset; hub ids name one content."""
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest() if Path(file).is_file() else ""
+
+
+STUDIES = Studies("kitchen", {KITCHEN.name: KITCHEN}, GROUPS, foretells=True)
+
+KITCHEN_KIT = Kit(
+    KITCHEN,
+    KitchenDataConfig,
+    _datasets,
+    KITCHEN_BUILDERS | LONG_HORIZON_BUILDERS | STUDIES.builders,
+    Costs(
+        update={
+            "agent": 0.022,
+            "mf-policy": 0.011,
+            "single-policy": 0.011,
+            "dynamics": 0.008,
+        },
+        demonstration={
+            "kitchen-demonstrations": 0.8,
+            "kitchen-long-horizon": 0.6,
+            "kitchen-held-out": 15.0,
+        },
+        whole={
+            "kitchen-anatomy": 300.0,
+            "kitchen-diagnosis": 120.0,
+            "kitchen-showcase": 60.0,
+        },
+        planned_segment=1.6,
+        segment=0.26,
+        success=0.3,
+        segment_bytes=1300,
+    ),
+    extras={"held-out": "kitchen-held-out"},
+    for_extras=("held_out",),
+    illustrations=physics_illustrations(
+        "kitchen",
+        ("microwave", "kettle", "bottom burner", "hinge cabinet"),
+        pairs=20,
+        episodes=6,
+    ),
+    long_horizon=_long_horizon,
+    label=_label,
+)

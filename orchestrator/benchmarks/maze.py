@@ -1,0 +1,38 @@
+"""What is to be known of the maze."""
+
+from __future__ import annotations
+
+from orchestrator.benchmarks.kit import Costs, Dataset, Illustration, Kit
+from orchestrator.builders.maze import MAZE_BUILDERS
+from orchestrator.builders.studies import maze_showcase_builder
+from stitching.data.maze import MazeDataConfig
+from stitching.envs.maze import MAZE
+
+
+def _datasets(config: MazeDataConfig) -> dict[str, Dataset]:
+    return {
+        "demonstrations": Dataset("maze-demonstrations"),
+        "exploration": Dataset("maze-exploration", teaches=False),
+    }
+
+
+MAZE_KIT = Kit(
+    MAZE,
+    MazeDataConfig,
+    _datasets,
+    MAZE_BUILDERS | {"maze-showcase": maze_showcase_builder(MAZE)},
+    Costs(
+        update={"agent": 0.005, "mf-policy": 0.003, "dynamics": 0.005},
+        planned_segment=0.005,
+        segment=0.003,
+        success=0.9,
+        segment_bytes=120,
+    ),
+    illustrations={
+        "showcase": Illustration(
+            "maze-showcase",
+            ("agent", "dynamics", "demonstrations"),
+            task=("g0", "g1", "g3", "g2"),  # the paper's Figure 1
+        )
+    },
+)

@@ -1,0 +1,43 @@
+"""What is to be known of robosuite's benchmarks."""
+
+from __future__ import annotations
+
+from orchestrator.benchmarks.kit import Costs, Dataset, Kit, physics_illustrations
+from orchestrator.builders.robosuite import ROBOSUITE_BUILDERS
+from orchestrator.builders.studies import Studies
+from stitching.data.robosuite.demonstrations import RobosuiteDataConfig
+from stitching.envs.protocol import Benchmark
+from stitching.envs.robosuite.block import GROUPS
+from stitching.envs.robosuite.can import CAN
+from stitching.envs.robosuite.door import DOOR
+
+STUDIES = Studies("robosuite", {DOOR.name: DOOR, CAN.name: CAN}, GROUPS)
+
+
+def _kit(benchmark: Benchmark, *task: str) -> Kit:
+    return Kit(
+        benchmark,
+        RobosuiteDataConfig,
+        lambda config: {"demonstrations": Dataset("robosuite-demonstrations")},
+        ROBOSUITE_BUILDERS | STUDIES.builders,
+        Costs(
+            update={"agent": 0.03, "mf-policy": 0.01, "dynamics": 0.01},
+            demonstration={"robosuite-demonstrations": 0.6, "robosuite-held-out": 0.6},
+            whole={
+                "robosuite-anatomy": 150.0,
+                "robosuite-diagnosis": 60.0,
+                "robosuite-showcase": 60.0,
+            },
+            planned_segment=4.0,
+            segment=0.6,
+            success=0.5,
+            segment_bytes=1000,
+        ),
+        extras={"held-out": "robosuite-held-out"},
+        for_extras=("held_out",),
+        illustrations=physics_illustrations("robosuite", task, pairs=1, episodes=30),
+    )
+
+
+DOOR_KIT = _kit(DOOR, "open door", "close door")
+CAN_KIT = _kit(CAN, "can", "can")

@@ -1,0 +1,19 @@
+"""The builders by kind of artifact: of what is trained, and of every benchmark's own."""
+
+from __future__ import annotations
+
+from functools import reduce
+from operator import or_
+
+from orchestrator.benchmarks.registry import KITS
+from orchestrator.builders.parts import Builder
+from orchestrator.builders.training import TRAINING_BUILDERS
+
+BUILDERS: dict[str, Builder] = reduce(
+    or_, (dict(kit.builders) for kit in KITS.values()), TRAINING_BUILDERS
+)
+
+# What decides a block's outcome beside its method and the models: Algorithm 1, what counts,
+BLOCK_CODE = ("stitching.rollout", "stitching.envs.first_times")
+# and how they are set up, without the method's code that these import for other purposes.
+BLOCK_SETUP = ("orchestrator.builders.models", "orchestrator.methods", "orchestrator.worker")
