@@ -91,7 +91,7 @@ class RunSpec:
                 own_first_skill=frozenset(
                     m["name"] for m in spec["methods"] if m.get("own_first_skill", False)
                 ),
-                models={m["name"]: tuple(m.get("models", ())) for m in spec["methods"]},
+                models={m["name"]: tuple(m["models"]) for m in spec["methods"] if "models" in m},
                 block_episodes=spec.get("spec", {}).get("block_episodes", 1),
                 long_task=spec.get("spec", {}).get("single_policy", {}).get("task", ""),
                 settings=_settings(spec.get("spec", {})),

@@ -1,4 +1,4 @@
-"""The artifacts that a spec needs: its datasets, its models, and what is only looked at."""
+"""The recipes of what a spec needs: its datasets, its models, and what is only looked at."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ from typing import TypeVar
 
 from orchestrator.benchmarks.kit import TEACHING, Dataset, Illustration
 from orchestrator.benchmarks.registry import BENCHMARKS, KITS
-from orchestrator.errors import UsageError
-from orchestrator.methods import SHARED, deciding, method_of
-from orchestrator.recipes import Recipe
+from orchestrator.methods import SHARED, method_of, playing_modules, settings_with_effect
+from orchestrator.recipes import Recipe, code_fingerprint
 from orchestrator.spec import Spec
 from orchestrator.structure import Plain, to_plain
 from stitching.methods.mb_stitch import MB_STITCH
@@ -26,32 +25,36 @@ S = TypeVar("S", bound=MethodSettings)
 
 
 @dataclass
-class Artifacts:
-    """Recipes by key, in an order in which they can be made."""
+class Recipes:
+    """By key, in an order in which they can be made."""
 
     spec: Spec
-    recipes: dict[str, Recipe] = field(default_factory=dict)
-    datasets: dict[str, str] = field(default_factory=dict)  # learned from: role → key
+    by_key: dict[str, Recipe] = field(default_factory=dict)
+    datasets: dict[str, str] = field(default_factory=dict)  # role → key; dynamics learn from all
+    long_horizon: dict[str, str] = field(default_factory=dict)  # likewise, of Single-Policies
     models: dict[tuple[str, int, str], str] = field(default_factory=dict)  # see `Plan.models`
     illustrations: dict[str, str] = field(default_factory=dict)  # name → key
 
     def add(self, kind: str, params: Plain, inputs: dict[str, str] | None = None) -> str:
         """Key of the recipe; the same one twice is one."""
         recipe = Recipe(kind, {"benchmark": self.spec.benchmark, **params}, inputs or {})
-        self.recipes[recipe.key] = recipe
+        self.by_key[recipe.key] = recipe
         return recipe.key
+
+    def add_datasets(self) -> None:
+        """What skills and dynamics are learned from, where any method needs skills."""
+        if not any(method_of(method).told for method in self.spec.methods):
+            return
+        for role, one in self._kit_datasets.items():
+            params = {"config": self.data_settings, **self.root, **one.params}
+            self.datasets[role] = self.add(one.kind, params)
 
     def add_models(self) -> None:
         """What the spec's methods are played with, under every seed."""
-        players = [*self.spec.methods]
-        if any(method_of(method).told for method in players):
-            players.append(SHARED)
-        needed = {kind for method in players for kind in method_of(method).models}
-        if unknown := sorted(needed - MODELS.keys()):
-            raise UsageError(f"no recipe for models of kind {unknown[0]!r}")
+        shared = [SHARED] if any(method_of(method).told for method in self.spec.methods) else []
         for kind, recipe_of in MODELS.items():
             for seed in range(self.spec.seeds):
-                for method in players:
+                for method in (*self.spec.methods, *shared):
                     if kind in method_of(method).models:
                         self.models[kind, seed, method] = recipe_of(self, seed, method)
 
@@ -60,11 +63,8 @@ class Artifacts:
         ours = _settings(self.spec, MB_STITCH)[:1]
         if not ours:
             return
-        kit, root = KITS[self.spec.benchmark], {"root_seed": self.spec.root_seed}
-        extras = {
-            role: self.add(kind, {"config": to_plain(self.spec.data), **root})
-            for role, kind in kit.extras.items()
-        }
+        kit, data = KITS[self.spec.benchmark], {"config": to_plain(self.spec.data)}
+        extras = {role: self.add(kind, data | self.root) for role, kind in kit.extras.items()}
         models = {kind: self.models[kind, 0, ours[0][0]] for kind in MB_STITCH.models}
         there = models | self.datasets | extras
         for name, one in kit.illustrations.items():
@@ -72,22 +72,11 @@ class Artifacts:
             inputs = {role: there[role] for role in chain.from_iterable(roles)}
             self.illustrations[name] = self.add(one.kind, _illustrated(self.spec, one), inputs)
 
-    @cached_property
+    @property
     def demonstrations(self) -> dict[str, str]:
         """The datasets that skills are learned from: role → key."""
-        return {
-            role: self.all_data[role] for role, one in self._kit_datasets.items() if one.teaches
-        }
-
-    @cached_property
-    def all_data(self) -> dict[str, str]:
-        """The datasets that dynamics are learned from: role → key."""
-        made = {
-            role: self.add(one.kind, {"config": self.data_settings, **self.root, **one.params})
-            for role, one in self._kit_datasets.items()
-        }
-        self.datasets |= made
-        return made
+        teaching = (role for role, one in self._kit_datasets.items() if one.teaches)
+        return {role: self.datasets[role] for role in teaching}
 
     @cached_property
     def data_settings(self) -> Plain:
@@ -118,43 +107,43 @@ class Artifacts:
         return plain
 
 
-def _agent(make: Artifacts, seed: int, method: str) -> str:
-    learner = {"config": to_plain(make.spec.agent)}
-    if make.spec.agent.alters:
-        learner["factors"] = make.factors
-    return make.add("agent", {**learner, **make.root, "seed": seed}, make.demonstrations)
+def _agent(recipes: Recipes, seed: int, method: str) -> str:
+    learner = {"config": to_plain(recipes.spec.agent)}
+    if recipes.spec.agent.alters:
+        learner["factors"] = recipes.factors
+    return recipes.add("agent", {**learner, **recipes.root, "seed": seed}, recipes.demonstrations)
 
 
-def _initiation_sets(make: Artifacts, seed: int, method: str) -> str:
+def _initiation_sets(recipes: Recipes, seed: int, method: str) -> str:
     """The same for all seeds: they are of the data alone."""
-    return make.add("initiation-sets", {"factors": make.factors}, make.demonstrations)
+    return recipes.add("initiation-sets", {"factors": recipes.factors}, recipes.demonstrations)
 
 
-def _dynamics(make: Artifacts, seed: int, method: str) -> str:
-    params = {"config": to_plain(make.spec.dynamics), "seed": seed, **make.root}
-    return make.add("dynamics", params, make.all_data)
+def _dynamics(recipes: Recipes, seed: int, method: str) -> str:
+    params = {"config": to_plain(recipes.spec.dynamics), "seed": seed, **recipes.root}
+    return recipes.add("dynamics", params, recipes.datasets)
 
 
-def _mf_policy(make: Artifacts, seed: int, method: str) -> str:
-    settings = make.settings(method, MFStitchSettings)
-    params = {"config": to_plain(settings.training), "seed": seed, **make.root}
+def _mf_policy(recipes: Recipes, seed: int, method: str) -> str:
+    settings = recipes.settings(method, MFStitchSettings)
+    params = {"config": to_plain(settings.training), "seed": seed, **recipes.root}
     fine_tuned = settings.mixture == "fine-tuned"
-    start = {"agent": make.models["agent", seed, method]} if fine_tuned else {}
-    inputs = make.demonstrations | start
-    return make.add("mf-policy", params | {"mixture": settings.mixture}, inputs)
+    start = {"agent": recipes.models["agent", seed, method]} if fine_tuned else {}
+    inputs = recipes.demonstrations | start
+    return recipes.add("mf-policy", params | {"mixture": settings.mixture}, inputs)
 
 
-def _single_policy(make: Artifacts, seed: int, method: str) -> str:
-    settings = make.settings(method, SinglePolicySettings)
-    kind = KITS[make.spec.benchmark].long_horizon(make.spec.data)
-    shown = {"config": make.data_settings | {"episodes": settings.episodes}, **make.root}
-    key = make.add(kind, shown | {"order": settings.order})
-    make.datasets[f"demonstrations of {method}"] = key
-    params = {"config": to_plain(settings.training), "seed": seed, **make.root}
-    return make.add("single-policy", params, {"long-horizon": key})
+def _single_policy(recipes: Recipes, seed: int, method: str) -> str:
+    settings = recipes.settings(method, SinglePolicySettings)
+    kind = KITS[recipes.spec.benchmark].long_horizon(recipes.spec.data)
+    shown = {"config": recipes.data_settings | {"episodes": settings.episodes}, **recipes.root}
+    key = recipes.add(kind, shown | {"order": settings.order})
+    recipes.long_horizon[f"demonstrations of {method}"] = key
+    params = {"config": to_plain(settings.training), "seed": seed, **recipes.root}
+    return recipes.add("single-policy", params, {"long-horizon": key})
 
 
-MODELS: dict[str, Callable[[Artifacts, int, str], str]] = {
+MODELS: dict[str, Callable[[Recipes, int, str], str]] = {
     "agent": _agent,
     "initiation-sets": _initiation_sets,
     "dynamics": _dynamics,
@@ -170,13 +159,16 @@ def _illustrated(spec: Spec, illustration: Illustration) -> Plain:
     Of several MB-Stitches, the first. One that takes stitches apart knows what No-Stitch is.
     """
     params: Plain = {
-        "configs": {"dynamics": to_plain(spec.dynamics)},
         "rollout": to_plain(spec.rollout),
         "step_limit": spec.step_limit,
         "root_seed": spec.root_seed,
         "seed": 0,
     }
     ours = _settings(spec, MB_STITCH)[:1]
+    planner = spec.method_settings(ours[0][0])
+    assert isinstance(planner, PlanningSettings)
+    modules = tuple(sorted(playing_modules(ours[0][0], planner)))
+    params["code"] = code_fingerprint(modules)  # of the planner, too
     if illustration.pairs:
         return params | {
             "methods": ours,
@@ -185,9 +177,7 @@ def _illustrated(spec: Spec, illustration: Illustration) -> Plain:
         }
     task = illustration.task
     if not task:
-        planning = spec.method_settings(ours[0][0])
-        assert isinstance(planning, PlanningSettings)
-        return params | {"horizon": planning.chosen.horizon}
+        return params | {"horizon": planner.chosen.horizon}
     return params | {
         # Whatever their order in the spec.
         "methods": _settings(spec, NO_STITCH) + ours,
@@ -198,7 +188,7 @@ def _illustrated(spec: Spec, illustration: Illustration) -> Plain:
 def _settings(spec: Spec, kind: Method) -> list[tuple[str, Plain]]:
     """The spec's methods of a kind, each with its settings."""
     return [
-        (method, deciding(spec.method_settings(method)))
+        (method, settings_with_effect(spec.method_settings(method)))
         for method in spec.methods
         if method_of(method) is kind
     ]

@@ -25,6 +25,9 @@ from orchestrator.store import write_atomically
 from stitching.models.checkpoints import Checkpoint
 from stitching.streams import Label
 
+FORMAT = 1
+"""Of the files: those of another one count as none."""
+
 PLAIN = "plain"
 """The tensor whose bytes are JSON: all that is no tensor."""
 
@@ -49,7 +52,7 @@ class Checkpoints:
         # Path.is_dir raises on EACCES.
         if self.folder is None or not os.path.isdir(self.folder.parent):
             return None
-        where = [torch.__version__, np.__version__, torch.backends.cpu.get_cpu_capability()]
+        where = [FORMAT, torch.__version__, np.__version__, torch.backends.cpu.get_cpu_capability()]
         told_apart = json.dumps([*where, *labels], default=int)
         name = hashlib.blake2b(told_apart.encode(), digest_size=16).hexdigest()
         return CheckpointFile(self.folder / name, self)
@@ -65,11 +68,11 @@ class CheckpointFile:
     """A digest, then tensors and what is plain."""
 
     path: Path
-    among: Checkpoints
+    build: Checkpoints  # whose it is
 
     def write(self, tensors: dict[str, Tensor], plain: dict[str, Any]) -> None:
         """Replace the file whole; a disk that refuses costs the checkpoint alone."""
-        kept = {"plain": plain, "seconds": self.among.spent}
+        kept = {"plain": plain, "seconds": self.build.spent}
         text = np.frombuffer(json.dumps(kept, default=np.ndarray.tolist).encode(), dtype=np.uint8)
         whole = {name: tensor.detach().contiguous() for name, tensor in tensors.items()}
         data = save(whole | {PLAIN: torch.from_numpy(text.copy())})
@@ -86,10 +89,10 @@ class CheckpointFile:
             return None
         try:
             tensors = load(data)
-        except SafetensorError:
+            kept = json.loads(tensors.pop(PLAIN).numpy().tobytes())
+        except (SafetensorError, KeyError, ValueError):
             return None
-        kept = json.loads(tensors.pop(PLAIN).numpy().tobytes())
-        self.among.earlier = max(self.among.earlier, kept["seconds"])
+        self.build.earlier = max(self.build.earlier, kept["seconds"])
         return tensors, kept["plain"]
 
 

@@ -179,7 +179,7 @@ def _steps_in_tree(plan: Plan) -> int:
 def _training_history(store: Store) -> dict[tuple[str, str], float]:
     """Seconds that artifacts of a kind and size took before on this machine's store.
 
-    The longest: what was tried beside other work, or without what caches hold, is to be expected.
+    The longest, which is what to expect where other work runs beside it.
     """
     seconds: dict[tuple[str, str], float] = {}
     for kind, key in store.artifacts():

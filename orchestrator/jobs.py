@@ -10,7 +10,6 @@ from orchestrator.ledger import Outcome
 from orchestrator.recipes import Recipe
 from orchestrator.store import Artifact
 from stitching.methods.protocol import MethodSettings
-from stitching.models.dynamics import DynamicsConfig
 from stitching.rollout import RolloutConfig
 
 ATTEMPTS = 3  # at one job, before it is given up
@@ -43,7 +42,6 @@ class BlockTask:
     step_limit: int
     rollout: RolloutConfig
     artifacts: dict[str, str]  # kind → key: the policies, and what the stitcher needs
-    configs: dict[str, DynamicsConfig]  # kind → how it was trained, where loading needs to know
 
     @property
     def kind(self) -> str:

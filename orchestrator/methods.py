@@ -25,16 +25,20 @@ def method_of(method: str) -> Method:
     return NO_STITCH if method == SHARED else METHODS[method_name(method)]
 
 
-def deciding(settings: MethodSettings) -> Plain:
-    """The settings that have an effect, as names of blocks contain them."""
+def settings_with_effect(settings: MethodSettings) -> Plain:
+    """As names of blocks contain them: what has no effect must not name anything."""
     plain: Plain = to_plain(settings)
     return {name: value for name, value in plain.items() if name not in settings.without_effect}
 
 
-def code_of(settings: MethodSettings) -> set[str]:
-    """The modules of settings that have an effect: a planner is its settings."""
-    parts = [getattr(settings, name) for name in deciding(settings)]
-    return {type(part).__module__ for part in (settings, *parts) if is_dataclass(part)}
+def playing_modules(method: str, settings: MethodSettings) -> set[str]:
+    """The modules that decide what a method does: its own, and those of settings with an effect.
+
+    A planner is its settings.
+    """
+    parts = [getattr(settings, name) for name in settings_with_effect(settings)]
+    within = {type(part).__module__ for part in parts if is_dataclass(part)}
+    return {type(settings).__module__, *method_of(method).modules, *within}
 
 
 def first_method(method: str, rollout: RolloutConfig) -> str:
@@ -43,8 +47,8 @@ def first_method(method: str, rollout: RolloutConfig) -> str:
     Methods that execute skills by the same policies and do not stitch before a first one play it
     alike, and share it.
     """
-    how = method_of(method)
-    own = not how.told or (rollout.first_stitch and how.stitcher.before_first)
+    played = method_of(method)
+    own = not played.told or (rollout.first_stitch and played.stitcher.before_first)
     return method if own else SHARED
 
 
@@ -54,11 +58,11 @@ def method_rollout(method: str, rollout: RolloutConfig) -> RolloutConfig:
     Where the policy is not told which skill is asked for, others may come in between: only the
     task's limit binds it. What cannot stitch to a first skill is played alike, asked to or not.
     """
-    how = method_of(method)
+    played = method_of(method)
     return replace(
         rollout,
-        skill_limit=rollout.skill_limit if how.told else 0,
-        first_stitch=rollout.first_stitch and how.stitcher.before_first,
+        skill_limit=rollout.skill_limit if played.told else 0,
+        first_stitch=rollout.first_stitch and played.stitcher.before_first,
     )
 
 

@@ -7,17 +7,17 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from orchestrator.artifacts import Artifacts
+from orchestrator.artifacts import Recipes
 from orchestrator.builders.registry import BLOCK_CODE, BLOCK_SETUP
 from orchestrator.jobs import BlockTask
 from orchestrator.methods import (
     SHARED,
-    code_of,
-    deciding,
     first_method,
     method_name,
     method_of,
     method_rollout,
+    playing_modules,
+    settings_with_effect,
 )
 from orchestrator.recipes import Recipe, code_fingerprint, digest
 from orchestrator.spec import Spec
@@ -39,30 +39,36 @@ class Node:
 
 
 @dataclass(frozen=True)
-class Player:
+class MethodBlocks:
     """What all blocks of a method have in common."""
 
     name: str  # of the method without its settings; SHARED likewise
     settings: MethodSettings
     rollout: RolloutConfig
-    named: Plain  # what their keys contain of it
+    code: str  # fingerprint of what plays them
 
     @classmethod
-    def of(cls, spec: Spec, method: str) -> Player:
-        # Planner streams are named by the kind of method, so that settings of one method are
-        # compared under common random numbers.
-        name = method_name(method) if method != SHARED else SHARED
+    def of(cls, spec: Spec, method: str) -> MethodBlocks:
         settings = spec.method_settings(method)
-        rollout = method_rollout(method, spec.rollout)
-        code = {*BLOCK_CODE, method_of(method).module, *code_of(settings)}
-        named = {
-            "settings": deciding(settings),
-            "rollout": to_plain(rollout),
-            "code": code_fingerprint(tuple(sorted(code)), BLOCK_SETUP),
+        return cls(
+            # Planner streams are named by the kind of method, so that settings of one method are
+            # compared under common random numbers.
+            method_name(method) if method != SHARED else SHARED,
+            settings,
+            method_rollout(method, spec.rollout),
+            code_fingerprint(
+                tuple(sorted({*BLOCK_CODE, *playing_modules(method, settings)})), BLOCK_SETUP
+            ),
+        )
+
+    @cached_property
+    def named(self) -> Plain:
+        """What their keys contain of it."""
+        return {
+            "settings": settings_with_effect(self.settings),
+            "rollout": to_plain(self.rollout),
+            "code": self.code,
         }
-        if "dynamics" in method_of(method).models:
-            named["dynamics"] = to_plain(spec.dynamics)
-        return cls(name, settings, rollout, named)
 
 
 @dataclass(frozen=True)
@@ -118,43 +124,43 @@ class Plan:
         return (node for node in self.nodes if node.parent is None)
 
     @cached_property
-    def _players(self) -> dict[str, Player]:
+    def method_blocks(self) -> dict[str, MethodBlocks]:
         """By method: a paper's table has a hundred thousand blocks, and few methods."""
-        return {method: Player.of(self.spec, method) for method in (SHARED, *self.spec.methods)}
+        methods = dict.fromkeys(node.method for node in self.nodes)
+        return {method: MethodBlocks.of(self.spec, method) for method in methods}
 
     def _task(self, node: Node, episodes: tuple[int, int]) -> BlockTask:
-        spec, player = self.spec, self._players[node.method]
-        artifacts = {
-            kind: self.models[kind, node.seed, node.method]
-            for kind in method_of(node.method).models
-        }
+        alike = self.method_blocks[node.method]
         place: dict[str, Any] = {
-            "benchmark": spec.benchmark,
-            "root_seed": spec.root_seed,
+            "benchmark": self.spec.benchmark,
+            "root_seed": self.spec.root_seed,
             "seed": node.seed,
-            "method": player.name,
+            "method": alike.name,
             "prefix": node.prefix,
             "episodes": episodes,
-            "step_limit": spec.step_limit,
-            "artifacts": artifacts,
+            "step_limit": self.spec.step_limit,
+            "artifacts": {
+                kind: self.models[kind, node.seed, node.method]
+                for kind in method_of(node.method).models
+            },
         }
-        configs = {"dynamics": spec.dynamics} if "dynamics" in artifacts else {}
-        return BlockTask(
-            key=digest(place | player.named),
-            settings=player.settings,
-            rollout=player.rollout,
-            configs=configs,
-            **place,
-        )
+        key = digest(place | alike.named)
+        return BlockTask(key=key, settings=alike.settings, rollout=alike.rollout, **place)
 
 
 def make_plan(spec: Spec) -> Plan:
     """Expand a spec. Pure: looks at neither store nor ledger."""
-    made = Artifacts(spec)
-    made.add_models()
-    made.add_illustrations()
+    recipes = Recipes(spec)
+    recipes.add_datasets()
+    recipes.add_models()
+    recipes.add_illustrations()
     return Plan(
-        spec, made.recipes, made.models, made.datasets, made.illustrations, tuple(_nodes(spec))
+        spec,
+        recipes.by_key,
+        recipes.models,
+        recipes.datasets | recipes.long_horizon,
+        recipes.illustrations,
+        tuple(_nodes(spec)),
     )
 
 

@@ -9,8 +9,10 @@ from collections.abc import Iterable
 from datetime import UTC, datetime
 from pathlib import Path
 
-from orchestrator.builders.registry import BLOCK_CODE, BLOCK_SETUP, BUILDERS
+from orchestrator.builders.registry import BUILDERS
 from orchestrator.cores import usable_cores
+from orchestrator.methods import method_label
+from orchestrator.plan import Plan
 from orchestrator.recipes import NUMERIC_PACKAGES, code_fingerprint
 from orchestrator.structure import Plain
 
@@ -29,13 +31,20 @@ REPORTED_PACKAGES = (
 SOURCES = ("stitching", "orchestrator", "sweeps", "analysis", "pyproject.toml", "constraints.txt")
 
 
-def matters(kinds: Iterable[str]) -> Plain:
-    """What must not change under a run whose scores depend on artifacts of these kinds."""
-    parts = {kind: (BUILDERS[kind].code, BUILDERS[kind].setup) for kind in sorted(kinds)}
-    parts["blocks"] = BLOCK_CODE, BLOCK_SETUP
-    code = {f"code that makes {kind}": code_fingerprint(*of)[:12] for kind, of in parts.items()}
+def matters(plans: Iterable[Plan]) -> Plain:
+    """What must not change under a run with these plans: code that its scores depend on."""
+    made: dict[str, str] = {}
+    played: dict[str, set[str]] = {}
+    for plan in plans:
+        for kind in plan.scored_kinds:
+            builder = BUILDERS[kind]
+            made[f"code that makes {kind}"] = code_fingerprint(builder.code, builder.setup)[:12]
+        for blocks in plan.method_blocks.values():
+            name = method_label(blocks.name) if blocks.name else "shared first skills"
+            played.setdefault(f"code that plays {name}", set()).add(blocks.code[:12])
     packages = {name: importlib.metadata.version(name) for name in NUMERIC_PACKAGES}
-    return code | packages
+    codes = {name: " ".join(sorted(several)) for name, several in played.items()}
+    return made | codes | packages
 
 
 def provenance() -> Plain:

@@ -7,7 +7,7 @@ import hashlib
 import importlib.metadata
 import importlib.util
 import json
-from collections.abc import Iterable
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -16,7 +16,10 @@ from typing import Any
 from orchestrator.builders.registry import BUILDERS
 from orchestrator.structure import Plain
 
-METHOD_PACKAGE = "stitching"
+OUR_PACKAGE = "stitching"
+# Lists of parts: a part that is used is named by itself, and no other decides anything.
+NOT_FOLLOWED = {"stitching.registry", "stitching.planning.registry", "stitching.methods.registry"}
+CODE = (".py", ".so", ".pyd")
 # Whose versions may change the bytes of any result.
 NUMERIC_PACKAGES = ("gymnasium-robotics", "mujoco", "numpy", "robosuite", "scipy", "torch")
 
@@ -54,42 +57,80 @@ class Recipe:
 
 @cache
 def code_fingerprint(modules: tuple[str, ...], beside: tuple[str, ...] = ()) -> str:
-    """Hash of the syntax trees of some modules and of what they need of `stitching`.
+    """Hash of the syntax trees of some modules and of every `stitching` module that they need.
 
-    Where a module is another package's, of what they need of that, too. Modules named `beside` are
-    added without what they import. Comments, docstrings and formatting do not matter; any other
-    change does, and so do the versions of the numeric packages and of packages that bring modules.
-    So an edit to a planner retrains nothing, and an edit to IQL retrains exactly what IQL made.
+    Modules named `beside` are added without what they import. Comments, docstrings and formatting
+    do not matter; any other change does, and so do the versions of the numeric packages. So an edit
+    to a planner retrains nothing, and an edit to IQL retrains exactly what IQL made.
+
+    Of a module of another package all of that package counts, its compiled modules and its version
+    included: what is needed of it is not ours to say.
     """
-    trees = {name: _syntax(_tree(name)) for name in sorted(_closure(modules) | set(beside))}
-    versions = {name: importlib.metadata.version(name) for name in NUMERIC_PACKAGES}
-    return digest({"modules": trees, "packages": versions | _versions(_packages(modules))})
+    names = [name for name in modules if _is_ours(name)]
+    others = _Distribution.of(frozenset(set(modules) - set(names)))
+    needed = _closure((*names, *others.asks_for))
+    return digest(
+        {
+            "modules": {name: _syntax(_tree(name)) for name in sorted(needed | set(beside))},
+            "packages": {name: importlib.metadata.version(name) for name in NUMERIC_PACKAGES},
+            "other packages": others.content,
+        }
+    )
 
 
-def _packages(modules: Iterable[str]) -> set[str]:
-    """The top-level packages that bring some modules."""
-    return {module.partition(".")[0] for module in modules}
+def _is_ours(module: str) -> bool:
+    return module.partition(".")[0] == OUR_PACKAGE
 
 
-def _versions(packages: set[str]) -> dict[str, str]:
-    """Versions of the distributions of packages that are not ours."""
-    others = packages - {METHOD_PACKAGE}
-    if not others:
-        return {}
-    brought_by = importlib.metadata.packages_distributions()
-    names = {name for package in others for name in brought_by.get(package, [])}
-    return {name: importlib.metadata.version(name) for name in sorted(names)}
+@dataclass(frozen=True)
+class _Distribution:
+    """All that other packages bring with some of their modules."""
+
+    content: Plain  # versions by distribution, hashes by file
+    asks_for: tuple[str, ...]  # modules of ours that theirs import
+
+    @classmethod
+    def of(cls, modules: frozenset[str]) -> _Distribution:
+        if not modules:
+            return cls({}, ())
+        brought_by = importlib.metadata.packages_distributions()
+        packages = {module.partition(".")[0] for module in modules}
+        names = {name for package in packages for name in brought_by.get(package, [])}
+        packages |= {package for package, by in brought_by.items() if names & set(by)}
+        content = {name: importlib.metadata.version(name) for name in sorted(names)}
+        asks_for: set[str] = set()
+        for name, file in sorted(found for package in packages for found in _files_of(package)):
+            data = file.read_bytes()
+            content[name] = hashlib.sha256(data).hexdigest()
+            if file.suffix == ".py":
+                tree = ast.parse(data)
+                content[name] = _syntax(tree)
+                asks_for |= _named_imports(tree)
+        return cls(content, tuple(sorted(asks_for)))
+
+
+def _files_of(package: str) -> Iterator[tuple[str, Path]]:
+    """Python files and compiled modules of a top-level package or module, with their names."""
+    spec = importlib.util.find_spec(package)
+    if spec is None:
+        return
+    folders = [Path(folder) for folder in spec.submodule_search_locations or ()]
+    for folder in folders:
+        for suffix in CODE:
+            for file in folder.rglob(f"*{suffix}"):
+                yield f"{package}/{file.relative_to(folder)}", file
+    if not folders and spec.origin is not None:
+        yield package, Path(spec.origin)
 
 
 def _closure(modules: tuple[str, ...]) -> set[str]:
-    packages = frozenset({METHOD_PACKAGE} | _packages(modules))
     seen: set[str] = set()
     waiting = list(modules)
     while waiting:
         name = waiting.pop()
-        if name not in seen:
+        if name not in seen and name not in NOT_FOLLOWED:
             seen.add(name)
-            waiting.extend(_imports(name, packages))
+            waiting.extend(_named_imports(_tree(name)))
     return seen
 
 
@@ -101,16 +142,15 @@ def _tree(module: str) -> ast.Module:
     return ast.parse(Path(spec.origin).read_text())
 
 
-def _imports(module: str, packages: frozenset[str]) -> set[str]:
-    """Modules of the packages that a module imports, in any form and anywhere in it."""
+def _named_imports(tree: ast.Module) -> set[str]:
+    """Modules of ours that are imported, in any form and anywhere in a module."""
     named: set[str] = set()
-    for node in ast.walk(_tree(module)):
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             named |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module is not None:
+        elif isinstance(node, ast.ImportFrom) and node.module is not None and not node.level:
             named |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
-    own = {name for name in named if "." in name and name.partition(".")[0] in packages}
-    return {name for name in own if _is_module(name)}
+    return {name for name in named if "." in name and _is_ours(name) and _is_module(name)}
 
 
 def _is_module(name: str) -> bool:

@@ -30,7 +30,7 @@ def reproduce_suite(suite: Suite, settings: Settings, progress: Progress) -> Run
     with directory.locked(), locking.shared(settings.store, progress.say):
         run_id = directory.claim(
             describe_suite(suite),
-            set().union(*(make_plan(part.spec).scored_kinds for part in suite.parts)),
+            [make_plan(part.spec) for part in suite.parts],
             lambda: suite_differences(suite_of(directory), suite),
         )
         directory.uses(settings.store)

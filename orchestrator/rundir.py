@@ -16,9 +16,9 @@ from orchestrator.benchmarks.registry import KITS
 from orchestrator.errors import ChangedError, UsageError
 from orchestrator.ledger import Ledger
 from orchestrator.methods import first_method, method_label, method_of
-from orchestrator.plan import make_plan
+from orchestrator.plan import Plan, make_plan
 from orchestrator.provenance import matters
-from orchestrator.spec import Spec, TableSpec, differences, spec_from_plain
+from orchestrator.spec import Spec, TableSpec, differences, plain_spec, spec_from_plain
 from orchestrator.store import USUAL_STORE, write_atomically
 from orchestrator.structure import Plain, to_plain
 
@@ -86,25 +86,25 @@ class RunDirectory:
 
         Raises ChangedError naming what differs: a field, a package version, the code.
         """
-        kinds = make_plan(spec).scored_kinds
-        return self.claim(describe(spec), kinds, lambda: differences(self.spec(), spec))
+        return self.claim(describe(spec), [make_plan(spec)], lambda: differences(self.spec(), spec))
 
     def claim(
-        self, description: Plain, kinds: Iterable[str], differing: Callable[[], list[str]]
+        self, description: Plain, plans: Iterable[Plan], differing: Callable[[], list[str]]
     ) -> str:
         """As `settle`, for whatever is described; `differing` compares it with what is there.
 
-        Its scores depend on artifacts of these kinds.
+        Its scores depend on what these plans make and play.
         """
+        now = matters(plans)
         identity_path = self.path / "identity.json"
         if not identity_path.exists():
-            identity = {"run_id": uuid.uuid4().hex, "matters": matters(kinds)}
+            identity = {"run_id": uuid.uuid4().hex, "matters": now}
             self.write_json("spec.json", description)
             self.write_json("identity.json", identity)
             return str(identity["run_id"])
         identity = json.loads(identity_path.read_text())
         changed = differing()
-        before, now = identity["matters"], matters(kinds)
+        before = identity["matters"]
         changed += [
             f"{name}: {before.get(name)} → {now[name]}"
             for name in sorted(now)
@@ -175,7 +175,7 @@ def describe(spec: Spec) -> Plain:
         "tasks": [">".join(task) for task in spec.all_tasks],
         "step_limits": {str(length): limit for length, limit in spec.step_limits.items()},
         "tables": [to_plain(table) | _title(spec, table) for table in spec.tables],
-        "spec": to_plain(spec),
+        "spec": plain_spec(spec),
     }
 
 

@@ -13,8 +13,16 @@ import tyro
 
 from analysis.rows import ROW_RULES
 from orchestrator.benchmarks.registry import BENCHMARKS, KITS
+from orchestrator.builders.models import LOADERS
 from orchestrator.errors import UsageError
-from orchestrator.methods import SHARED, method_name, method_of, parse_method
+from orchestrator.methods import (
+    SHARED,
+    method_name,
+    method_of,
+    parse_method,
+    settings_with_effect,
+)
+from orchestrator.recipes import OUR_PACKAGE
 from orchestrator.structure import Plain, merged, nested, settings_of, structure, to_plain
 from orchestrator.tomls import PACKAGED, Scale, based_fields, read_toml
 from stitching.bounds import Bounded, Count, Episodes, Few, Seed
@@ -23,7 +31,8 @@ from stitching.methods.protocol import MethodSettings
 from stitching.methods.registry import METHODS
 from stitching.models.dynamics import DynamicsConfig
 from stitching.models.iql import IQLConfig
-from stitching.registry import field_name, sections
+from stitching.planning.registry import PLANNERS, PlannerChoice
+from stitching.registry import PartError, field_name, sections
 from stitching.rollout import RolloutConfig
 
 NAME = re.compile(r"[A-Za-z0-9][\w.-]*")  # becomes part of paths
@@ -46,8 +55,6 @@ if TYPE_CHECKING:
 
     class MethodSections(Bounded):
         """A field for the settings of each method: `mb_stitch`, `reach_stitch`."""
-
-        def __getattr__(self, name: str) -> Any: ...
 
 else:
     DataSettings = Union[tuple(dict.fromkeys(kit.data for kit in KITS.values()))]  # noqa: UP007
@@ -124,6 +131,11 @@ class Spec(MethodSections):
         return structure(METHODS[name].settings, settings, f"spec {self.name}, method {method}")
 
 
+for _name in METHODS:
+    if field_name(_name) in {*Spec.__annotations__, *vars(Bounded), *vars(Spec)}:
+        raise PartError(f"method {_name!r}: specs have another field or property so called")
+
+
 def check_spec(spec: Spec) -> None:
     """Refuse what could not be carried out, before anything runs; UsageError says what is valid."""
     where = f"spec {spec.name}"
@@ -183,9 +195,14 @@ def _check_methods(spec: Spec, where: str) -> None:
     seen: dict[tuple[str, str], str] = {}
     for method in spec.methods:
         settings = spec.method_settings(method)
-        same = seen.setdefault((method_name(method), str(settings)), method)
+        same = seen.setdefault((method_name(method), str(settings_with_effect(settings))), method)
         if same != method or spec.methods.count(method) > 1:
             raise UsageError(f"{where}, methods: {same} and {method} are the same method")
+        if unknown := [kind for kind in method_of(method).models if kind not in LOADERS]:
+            raise UsageError(
+                f"{where}, {method}: needs models of an unknown kind, {unknown[0]!r}; there are "
+                f"{', '.join(LOADERS)}"
+            )
         if "single-policy" in method_of(method).models:
             _check_demonstrated(spec, f"{where}, {method}")
         with settings_of(f"{where}, {method}"):
@@ -234,6 +251,28 @@ def spec_from_plain(content: Plain, where: str) -> Spec:
         )
     data = structure(KITS[benchmark].data, content.get("data", {}), f"{where}, data")
     return structure(Spec, content | {"data": data}, where)
+
+
+def plain_spec(spec: Spec) -> Plain:
+    """A spec as files keep it, which can be read without packages whose parts it does not use."""
+    plain: Plain = to_plain(spec)
+    used = {method_name(method) for method in spec.methods}
+    for name in METHODS.keys() - used:
+        if not _is_ours(METHODS[name].settings):
+            plain.pop(field_name(name), None)
+    every = (spec.method_settings(method) for method in spec.methods)
+    chosen = {one.planner for one in every if isinstance(one, PlannerChoice)}
+    unused = [name for name in PLANNERS.keys() - chosen if not _is_ours(PLANNERS[name])]
+    planning = [one for one in plain.values() if isinstance(one, dict) and "planner" in one]
+    for section in planning:
+        for name in unused:
+            if section["planner"] != name:
+                section.pop(field_name(name))
+    return plain
+
+
+def _is_ours(part: type) -> bool:
+    return part.__module__.partition(".")[0] == OUR_PACKAGE
 
 
 def differences(old: Spec, new: Spec) -> list[str]:

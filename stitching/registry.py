@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import make_dataclass
+from dataclasses import MISSING, fields, is_dataclass, make_dataclass
 from importlib.metadata import EntryPoint, entry_points
+from keyword import iskeyword
 from typing import Any, TypeVar
 
 from stitching.bounds import Bounded
@@ -25,23 +26,31 @@ class PartError(ImportError):
     """A part of another package cannot be used."""
 
 
-def with_installed(group: str, own: Mapping[str, T], fits: Callable[[Any], bool]) -> dict[str, T]:
-    """`own` parts by name, and after them those of an entry point group for which `fits` holds.
+def with_installed(group: str, own: Mapping[str, T], wrong: Callable[[Any], str]) -> dict[str, T]:
+    """`own` parts by name, and after them those of an entry point group.
 
-    Raises PartError, naming package and entry point, where a part of another package cannot be
-    loaded, does not fit, or has a name that is taken or cannot be made a field's.
+    `wrong` says what keeps a part from being one, empty where nothing does. Raises PartError,
+    naming package and entry point, where a part of another package cannot be loaded, is wrong, or
+    has a name that is taken or cannot be a field's.
     """
     parts = dict(own)
     for point in sorted(entry_points(group=group), key=lambda point: point.name):
         package = point.dist.name if point.dist is not None else "an installed package"
         where = f"{package}, entry point {point.name!r} of {group}"
-        if not NAME.fullmatch(point.name):
-            raise PartError(f"{where}: names have small letters, digits and '-' between words")
+        if not NAME.fullmatch(point.name) or iskeyword(point.name):
+            raise PartError(
+                f"{where}: names have small letters, digits and '-' between words, and are no "
+                "keywords of Python"
+            )
         if point.name in parts:
             raise PartError(f"{where}: this name is taken")
         part = _load(point, where)
-        if not fits(part):
-            raise PartError(f"{where}: {point.value} is not what {group} are: docs/extending.md")
+        try:
+            problem = wrong(part)
+        except Exception as error:
+            problem = f"{type(error).__name__}: {error}"
+        if problem:
+            raise PartError(f"{where}: {point.value} {problem} (see docs/extending.md)")
         parts[point.name] = part
     return parts
 
@@ -53,6 +62,20 @@ def _load(point: EntryPoint, where: str) -> Any:
         raise PartError(f"{where}: {type(error).__name__}: {error}") from error
 
 
+def wrong_settings(settings: Any, base: type) -> str:
+    """What keeps a class from being settings of a part, in words; empty where nothing does."""
+    if not isinstance(settings, type) or not is_dataclass(settings):
+        return "is no dataclass"
+    if not issubclass(settings, base):
+        return f"does not inherit from {base.__name__}"
+    lacking = [
+        one.name
+        for one in fields(settings)
+        if one.default is MISSING and one.default_factory is MISSING
+    ]
+    return f"has no default for {lacking[0]!r}" if lacking else ""
+
+
 def field_name(part: str) -> str:
     """What settings of a part are called in files: those of "mb-stitch" are "mb_stitch"."""
     return part.replace("-", "_")
@@ -60,5 +83,5 @@ def field_name(part: str) -> str:
 
 def sections(name: str, parts: Mapping[str, type]) -> type:
     """A frozen dataclass with a field for the settings of each part, the defaults its own."""
-    fields = [(field_name(part), settings, settings()) for part, settings in parts.items()]
-    return make_dataclass(name, fields, bases=(Bounded,), frozen=True)
+    named = [(field_name(part), settings, settings()) for part, settings in parts.items()]
+    return make_dataclass(name, named, bases=(Bounded,), frozen=True)

@@ -6,6 +6,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from orchestrator.methods import method_name, settings_with_effect
 from orchestrator.spec import Spec
 from sweeps.space import Fields, Value, replaced
 
@@ -57,18 +58,21 @@ def _once(methods: dict[str, None], spec: Spec) -> list[str]:
     """Methods that say the same in other words (1 and 1.0), once."""
     kept: dict[str, str] = {}
     for method in methods:
-        kept.setdefault(repr(spec.method_settings(method)), method)
+        kept.setdefault(_meaning(spec, method), method)
     return list(kept.values())
 
 
 def _renamed(group: Group) -> Group:
     """Every candidate under the one name that its method was kept by."""
-    kept = {repr(group.spec.method_settings(method)): method for method in group.spec.methods}
-    methods = {
-        place: kept[repr(group.spec.method_settings(method))]
-        for place, method in group.methods.items()
-    }
+    kept = {_meaning(group.spec, method): method for method in group.spec.methods}
+    methods = {place: kept[_meaning(group.spec, method)] for place, method in group.methods.items()}
     return replace(group, methods=methods)
+
+
+def _meaning(spec: Spec, method: str) -> str:
+    """The same for methods that play alike."""
+    settings = settings_with_effect(spec.method_settings(method))
+    return f"{method_name(method)} {settings}"
 
 
 def _text(value: Value) -> str:

@@ -1,4 +1,4 @@
-"""Actions that are held: a method that holds one drawn by chance, a planner that searches them."""
+"""Hold-Stitch: actions drawn by chance, each held for some steps."""
 
 from __future__ import annotations
 
@@ -7,14 +7,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-import torch
 from torch import Tensor
 
-from stitching.bounds import Amount, Bounded, Count, Few
-from stitching.envs.protocol import ActionSpace
+from stitching.bounds import Amount, Few
 from stitching.methods.protocol import Method, MethodSettings, Models, Proposal
-from stitching.planning.protocol import Plan, Score
-from stitching.planning.ranking import rankable
 
 
 @dataclass(frozen=True)
@@ -48,31 +44,3 @@ class HoldStitch:
 
 
 HOLD_STITCH = Method("Hold-Stitch", HoldStitchSettings, HoldStitch)
-
-
-@dataclass(frozen=True)
-class HoldShooting(Bounded):
-    """Draws actions uniformly, imagines each held for the whole horizon, and keeps the best."""
-
-    population: Count = 50  # actions drawn a problem
-    horizon: Few = 5  # steps for which each is held
-
-    @property
-    def samples(self) -> int:
-        return self.population
-
-    def can_search(self, actions: ActionSpace) -> bool:
-        return True
-
-    @torch.no_grad()
-    def plan(
-        self, score: Score, streams: Sequence[np.random.Generator], actions: ActionSpace
-    ) -> Plan:
-        drawn = np.empty((len(streams), self.population, 1, actions.size), dtype=np.float32)
-        for row, stream in zip(drawn, streams, strict=True):
-            row[:] = actions.uniform(stream, (self.population, 1))
-        sequences = torch.from_numpy(drawn.repeat(self.horizon, axis=2))
-        problems = torch.arange(len(streams))
-        scores = rankable(score(problems, sequences), problems)
-        best = scores.argmax(dim=1)
-        return Plan(sequences[problems, best], scores[problems, best], torch.ones_like(problems))

@@ -12,7 +12,7 @@ from stitching.registry import PartError, with_installed
 KITS: dict[str, Kit] = with_installed(
     "skillstitch.benchmarks",
     {kit.benchmark.name: kit for kit in (MAZE_KIT, KITCHEN_KIT, DOOR_KIT, CAN_KIT)},
-    lambda part: isinstance(part, Kit),
+    lambda part: "" if isinstance(part, Kit) else "is no Kit",
 )
 
 for name, kit in KITS.items():

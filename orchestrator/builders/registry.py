@@ -13,7 +13,7 @@ BUILDERS: dict[str, Builder] = reduce(
     or_, (dict(kit.builders) for kit in KITS.values()), TRAINING_BUILDERS
 )
 
-# What decides a block's outcome beside its method and the models: Algorithm 1, what counts,
+# What decides a block's outcome beside its method and its models: Algorithm 1, and what counts.
 BLOCK_CODE = ("stitching.rollout", "stitching.envs.first_times")
-# and how they are set up, without the method's code that these import for other purposes.
-BLOCK_SETUP = ("orchestrator.builders.models", "orchestrator.methods", "orchestrator.worker")
+# What sets it up, without what these import for other purposes.
+BLOCK_SETUP = ("orchestrator.builders.models", "orchestrator.methods", "orchestrator.playing")

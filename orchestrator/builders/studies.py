@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from orchestrator.builders.models import Configs, load_models
+from orchestrator.builders.models import load_models
 from orchestrator.builders.parts import Builder, Inputs
 from orchestrator.methods import method_of
 from orchestrator.store import Artifact
@@ -23,25 +23,21 @@ from stitching.forecast import pair_forecast
 from stitching.methods.mb_stitch import MB_STITCH, MBStitch
 from stitching.methods.no_stitch import NO_STITCH
 from stitching.methods.protocol import Models, Stitcher
-from stitching.models.dynamics import Dynamics, DynamicsConfig
+from stitching.models.dynamics import Dynamics
 from stitching.rollout import RolloutConfig
 from stitching.showcase.maze import maze_showcase
 from stitching.showcase.physics import physics_showcase
 from stitching.showcase.shown import Shown
 
 
-def _configs(params: Plain) -> Configs:
-    return {"dynamics": structure(DynamicsConfig, params["configs"]["dynamics"], "dynamics")}
-
-
 def _stitcher(method: str, settings: Plain, models: Models) -> Stitcher:
-    how = method_of(method)
-    return how.stitcher(structure(how.settings, settings, f"method {method}"), models)
+    played = method_of(method)
+    return played.stitcher(structure(played.settings, settings, f"method {method}"), models)
 
 
 def _shown(benchmark: Benchmark, params: Plain, inputs: Inputs) -> Shown:
     """What a showcase plays, from the parameters of its recipe."""
-    models = load_models(benchmark, _configs(params), inputs)
+    models = load_models(benchmark, inputs)
     return Shown(
         task=tuple(params["task"]),
         agent=models.agent,
@@ -55,7 +51,7 @@ def _shown(benchmark: Benchmark, params: Plain, inputs: Inputs) -> Shown:
     )
 
 
-PLAYED = (NO_STITCH.module, MB_STITCH.module)
+PLAYED = tuple(sorted(NO_STITCH.modules | MB_STITCH.modules))  # planners: see the recipes
 SETUP = ("orchestrator.builders.studies", "orchestrator.builders.models", "orchestrator.methods")
 
 
@@ -96,7 +92,7 @@ class Studies:
     def _diagnosis(self, params: Plain, inputs: Inputs) -> Artifact:
         """What `stitching.diagnosis` knows of the models, on the data of the role "held-out"."""
         benchmark = self.benchmarks[params["benchmark"]]
-        models = load_models(benchmark, _configs(params), inputs)
+        models = load_models(benchmark, inputs)
         agent, dynamics = models.agent, models.one("dynamics", Dynamics)
         columns = dict(inputs["held-out"].arrays)
         starts = columns.pop("starts")
@@ -116,7 +112,7 @@ class Studies:
     def _anatomy(self, params: Plain, inputs: Inputs) -> Artifact:
         """Inputs beside the models are what the skills were learned from."""
         benchmark = self.benchmarks[params["benchmark"]]
-        models = load_models(benchmark, _configs(params), inputs)
+        models = load_models(benchmark, inputs)
         ((method, settings),) = params["methods"]
         stitcher = _stitcher(method, settings, models)
         assert isinstance(stitcher, MBStitch)

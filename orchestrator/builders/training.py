@@ -123,7 +123,9 @@ def _single_policy(params: Plain, inputs: Inputs) -> Artifact:
 def _dynamics(params: Plain, inputs: Inputs) -> Artifact:
     _, data = _checked_data(params, inputs)
     config = structure(DynamicsConfig, params["config"], "dynamics")
-    return _trained(train_dynamics(data, config, *_labels("dynamics", params)))
+    trained = train_dynamics(data, config, *_labels("dynamics", params))
+    # How they compute is a part of what they are.
+    return Artifact(trained.weights, {"curves": trained.curves, "config": params["config"]})
 
 
 def _initiation_sets(params: Plain, inputs: Inputs) -> Artifact:

@@ -41,7 +41,8 @@ class _Player:
     """A block player with the artifacts it has been shown so far."""
 
     def __init__(self) -> None:
-        from orchestrator.worker import BlockPlayer, use_one_thread
+        from orchestrator.playing import BlockPlayer
+        from orchestrator.worker import use_one_thread
 
         use_one_thread()
         self._player = BlockPlayer()

@@ -7,8 +7,9 @@ from collections import deque
 from threadpoolctl import threadpool_limits
 
 from orchestrator.jobs import BuildJob, Job, Report
+from orchestrator.playing import BlockPlayer
 from orchestrator.store import Artifact
-from orchestrator.worker import BlockPlayer, build, use_one_thread
+from orchestrator.worker import build, use_one_thread
 
 
 class SerialExecutor:

@@ -59,15 +59,18 @@ def seed_scores(episodes: pd.DataFrame, spec: RunSpec, entry: TableEntry) -> dic
 
 
 def learning_curves(
-    method: str, kinds: Collection[str], seed: int, training: list[dict[str, Any]]
+    method: str, kinds: Collection[str] | None, seed: int, training: list[dict[str, Any]]
 ) -> Curves:
-    """Learning curves of the models, by kind, that a method is played with under this seed."""
+    """Learning curves of the models, by kind, that a method is played with under this seed.
+
+    Of all kinds where these are not known, as of runs of earlier versions.
+    """
     variant = method.partition(VARIANT)[2]
     used = [
         entry
         for entry in training
         if entry["seed"] == seed
-        and entry["kind"] in kinds
+        and (kinds is None or entry["kind"] in kinds)
         and (not variant or entry.get("part") == variant)
     ]
     several = {e["kind"] for e in used if sum(e["kind"] == other["kind"] for other in used) > 1}

@@ -99,7 +99,7 @@ def _child(
         tags={name: value for name, value in parent.tags.items() if name != NOTE},
         params=parent.params | _overrides(method) | {"method": method, "seed": str(seed)},
         numbers=numbers,
-        curves=learning_curves(method, spec.models[method], seed, training),
+        curves=learning_curves(method, spec.models.get(method), seed, training),
     )
 
 

@@ -32,14 +32,14 @@ class MFStitchSettings(MethodSettings):
             return
         if self.training.policy_hidden != agent.policy_hidden:
             raise ValueError(
-                f"hidden layers of {self.training.policy_hidden} cannot be fine-tuned from the "
-                f"skills' policy with {agent.policy_hidden}; set training.policy_width and "
-                "training.policy_layers to the agent's, or another mixture"
+                f"training: hidden layers of {self.training.policy_hidden} cannot be fine-tuned "
+                f"from the skills' policy with {agent.policy_hidden}; set policy_width and "
+                "policy_layers to the agent's, or another mixture"
             )
         if self.training.multi_task and not agent.multi_task:
             raise ValueError(
-                "skills with a policy each are fine-tuned pair by pair; set training.multi_task to "
-                "false, or another mixture"
+                "training: skills with a policy each are fine-tuned pair by pair; set multi_task "
+                "to false, or another mixture"
             )
 
 

@@ -22,8 +22,8 @@ class PlanningSettings(PlannerChoice, MethodSettings):
         kind = "discrete" if benchmark.actions.discrete else "continuous"
         others = [name for name in PLANNERS if self._can_search(name, benchmark)]
         raise ValueError(
-            f"{self.planner} cannot plan the {kind} actions of {benchmark.name}; set planner to "
-            f"{' or '.join(others)}"
+            f"planner: {self.planner} cannot plan the {kind} actions of {benchmark.name}; set it "
+            f"to {' or '.join(others)}"
         )
 
     @property

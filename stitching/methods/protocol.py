@@ -42,7 +42,12 @@ class Models:
     trained: Mapping[str, Any]  # by kind: those that the method asks for
 
     def one(self, kind: str, expected: type[M]) -> M:
-        """The model of a kind. Raises TypeError where it is not as expected."""
+        """The model of a kind.
+
+        Raises TypeError where it is not as expected, KeyError where the method does not need it.
+        """
+        if kind not in self.trained:
+            raise KeyError(f"{kind}: not among what the method needs")
         model = self.trained[kind]
         if not isinstance(model, expected):
             raise TypeError(f"{kind}: expected {expected.__name__}, got {type(model).__name__}")
@@ -114,6 +119,6 @@ class Method:
         return (self.policy, *self.needs)
 
     @property
-    def module(self) -> str:
-        """Whose code, with all it imports, decides what the method does."""
-        return self.settings.__module__
+    def modules(self) -> set[str]:
+        """Whose code, with all that they import, decides what the method does."""
+        return {self.settings.__module__, self.stitcher.__module__}

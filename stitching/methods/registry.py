@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from stitching.methods.mb_stitch import MB_STITCH
 from stitching.methods.mf_stitch import MF_STITCH
 from stitching.methods.no_stitch import NO_STITCH
-from stitching.methods.protocol import Method
+from stitching.methods.protocol import Method, MethodSettings
 from stitching.methods.random_stitch import RANDOM_STITCH
 from stitching.methods.reach_stitch import REACH_STITCH
 from stitching.methods.single_policy import SINGLE_POLICY
-from stitching.registry import with_installed
+from stitching.registry import with_installed, wrong_settings
+
+
+def _wrong(part: Any) -> str:
+    """What keeps a part from being a method, in words; empty where nothing does."""
+    if not isinstance(part, Method):
+        return "is no Method"
+    if wrong := wrong_settings(part.settings, MethodSettings):
+        return f"has settings that cannot be used: {part.settings.__name__} {wrong}"
+    asked = ("before_first", "until_value_falls", "limit", "propose")
+    lacking = [name for name in asked if not hasattr(part.stitcher, name)]
+    return f"has a stitcher without {lacking[0]!r}" if lacking else ""
+
 
 METHODS: dict[str, Method] = with_installed(
     "skillstitch.methods",
@@ -21,5 +35,5 @@ METHODS: dict[str, Method] = with_installed(
         "reach-stitch": REACH_STITCH,
         "single-policy": SINGLE_POLICY,
     },
-    lambda part: isinstance(part, Method),
+    _wrong,
 )

@@ -2,29 +2,43 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, is_dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
 
 from stitching.bounds import Bounded
 from stitching.planning.cem import CEM
 from stitching.planning.protocol import Planner
 from stitching.planning.random_shooting import RandomShooting
-from stitching.registry import field_name, sections, with_installed
+from stitching.registry import (
+    PartError,
+    field_name,
+    sections,
+    with_installed,
+    wrong_settings,
+)
+
+
+def _wrong(part: Any) -> str:
+    """What keeps a part from being a planner, in words; empty where nothing does."""
+    if wrong := wrong_settings(part, Bounded):
+        return wrong
+    asked = ("plan", "can_search", "horizon", "samples")
+    lacking = [name for name in asked if not hasattr(part(), name)]
+    return f"has no {lacking[0]!r}" if lacking else ""
+
 
 PLANNERS: dict[str, type[Planner]] = with_installed(
-    "skillstitch.planners",
-    {"random-shooting": RandomShooting, "cem": CEM},
-    lambda part: is_dataclass(part) and hasattr(part, "plan") and hasattr(part, "can_search"),
+    "skillstitch.planners", {"random-shooting": RandomShooting, "cem": CEM}, _wrong
 )
 
 if TYPE_CHECKING:
+    PlannerName = str
 
     class PlannerSections(Bounded):
         """A field for the settings of each planner: `cem`, `random_shooting`."""
 
-        def __getattr__(self, name: str) -> Any: ...
-
 else:
+    PlannerName = Literal[tuple(PLANNERS)]
     PlannerSections = sections("PlannerSections", PLANNERS)
 
 
@@ -32,12 +46,15 @@ else:
 class PlannerChoice(PlannerSections):
     """Settings of every planner, and which one plans."""
 
-    planner: str = "cem"  # random-shooting, cem, or one that another package brings
+    planner: PlannerName = "cem"
 
-    def __post_init__(self) -> None:
-        if self.planner not in PLANNERS:
-            raise ValueError(f"planner: {self.planner!r} is not one of {', '.join(PLANNERS)}")
-        super().__post_init__()
+    def __init_subclass__(cls) -> None:
+        """Raise PartError where a setting of a method has the name of a planner."""
+        super().__init_subclass__()
+        for name, planner in PLANNERS.items():
+            own = vars(cls).get(field_name(name))
+            if own is not None and not isinstance(own, planner):
+                raise PartError(f"planner {name!r}: {cls.__name__} has another setting so called")
 
     @property
     def chosen(self) -> Planner:

@@ -45,8 +45,17 @@ class StitcherConformance:
                 assert set(np.unique(wanted)) <= {0, 1}
                 assert (wanted.sum(axis=2) == 1).all()
 
-    def test_a_stitch_has_a_limit(self, stitcher: Stitcher) -> None:
+    def test_it_says_how_its_stitches_end(self, stitcher: Stitcher) -> None:
         assert stitcher.limit >= 1
+        assert isinstance(stitcher.before_first, bool)
+        assert isinstance(stitcher.until_value_falls, bool)
+
+    def test_it_leads_to_a_first_skill_where_it_says_so(
+        self, stitcher: Stitcher, states: Tensor
+    ) -> None:
+        if stitcher.before_first:
+            proposal = stitcher.propose(states, None, 1, streams(len(states)))
+            assert len(proposal.actions) == len(states)
 
     def test_a_proposal_belongs_to_its_stream_and_state(
         self, stitcher: Stitcher, states: Tensor
@@ -59,12 +68,13 @@ class StitcherConformance:
         own = streams(len(states))
         for row in range(len(states)):
             alone = stitcher.propose(states[row : row + 1], 0, 1, [own[row]])
-            assert np.array_equal(alone.actions[0], together.actions[row])
+            np.testing.assert_allclose(alone.actions[0], together.actions[row], atol=1e-6)
             assert alone.wanted[0] == together.wanted[row]
 
     def test_the_global_state_of_chance_is_left_alone(
         self, stitcher: Stitcher, states: Tensor
     ) -> None:
-        before = torch.get_rng_state()
+        before, numpys = torch.get_rng_state(), np.random.get_state()  # noqa: NPY002
         proposed(stitcher, states)
         assert torch.equal(torch.get_rng_state(), before)
+        assert str(np.random.get_state()) == str(numpys)  # noqa: NPY002

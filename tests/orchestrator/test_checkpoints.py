@@ -1,5 +1,6 @@
 """A training that was killed goes on from its last checkpoint and ends with the same bytes."""
 
+import hashlib
 import os
 from collections.abc import Callable
 from dataclasses import replace
@@ -8,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from safetensors.torch import save
 from torch import Tensor
 
-from orchestrator.checkpoints import Checkpoints
+from orchestrator.checkpoints import CheckpointFile, Checkpoints
 from stitching.envs.maze import MAZE
 from stitching.envs.protocol import ActionSpace
 from stitching.models import training
@@ -186,3 +188,12 @@ def test_what_earlier_attempts_took_is_counted(tmp_path: Path) -> None:
         dynamics()
     assert second.earlier >= 100.0
     assert second.spent >= second.earlier
+
+
+def test_a_whole_file_of_another_format_counts_as_none(tmp_path: Path) -> None:
+    kept = Checkpoints(tmp_path / "own").of(("x",))
+    assert isinstance(kept, CheckpointFile)
+    data = save({"model.w": torch.zeros(2)})
+    kept.path.parent.mkdir()
+    kept.path.write_bytes(hashlib.sha256(data).digest() + data)
+    assert kept.read() is None

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from analysis.results import provenance_text
-from orchestrator import worker
+from orchestrator import playing
 from orchestrator.cli import COMMANDS, main
 from orchestrator.errors import LockedError
 from orchestrator.plan import Plan
@@ -286,14 +286,14 @@ def test_bad_data_is_7(cli: Cli, place: Place, finished: Place, plan: Plan) -> N
 def test_blocks_given_up_are_3_with_the_partial_table(
     cli: Cli, trained: Place, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    play_segment = worker.play_segment
+    play_segment = playing.play_segment
 
     def faulty(*arguments):  # type: ignore[no-untyped-def]
         if any(getattr(item, "prefix", ()) == ("g0",) for item in arguments):
             raise RuntimeError("the simulator fell over")
         return play_segment(*arguments)
 
-    monkeypatch.setattr(worker, "play_segment", faulty)
+    monkeypatch.setattr(playing, "play_segment", faulty)
     answer = cli("run", *options(trained))
     assert answer.code == 3
     assert "# A tiny table" in answer.out
@@ -314,7 +314,7 @@ def test_a_disk_that_refuses_is_3(cli: Cli, place: Place) -> None:
 
 
 def test_an_interrupt_is_130(cli: Cli, trained: Place) -> None:
-    with mock.patch("orchestrator.worker.play_segment", side_effect=KeyboardInterrupt):
+    with mock.patch("orchestrator.playing.play_segment", side_effect=KeyboardInterrupt):
         answer = cli("run", *options(trained))
     assert answer.code == 130
     assert "the same command resumes" in answer.err
@@ -480,7 +480,7 @@ def test_gc_deletes_nothing_while_a_run_uses_the_store(cli: Cli, done: Place, sp
 
     before = set(done.store.artifacts())
     with (
-        mock.patch("orchestrator.worker.BlockPlayer.play", side_effect=play),
+        mock.patch("orchestrator.playing.BlockPlayer.play", side_effect=play),
         pytest.raises(KeyboardInterrupt),
     ):
         carry_out(changed, serially(other, done.store_root))

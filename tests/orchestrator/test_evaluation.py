@@ -6,7 +6,7 @@ from collections.abc import Callable
 import pandas as pd
 import pytest
 
-from orchestrator import worker
+from orchestrator import playing
 from orchestrator.errors import IncompleteError
 from orchestrator.evaluation import Evaluation
 from orchestrator.executors.serial import SerialExecutor
@@ -45,7 +45,7 @@ Break = Callable[..., None]
 @pytest.fixture
 def break_blocks(monkeypatch: pytest.MonkeyPatch) -> Break:
     """Make blocks raise while they are played: those a condition holds for, so many times."""
-    play_segment = worker.play_segment
+    play_segment = playing.play_segment
 
     def break_blocks(broken: Callable[[Play], bool], times: int = 10**9) -> None:
         left = Counter[Play]()
@@ -57,10 +57,10 @@ def break_blocks(monkeypatch: pytest.MonkeyPatch) -> Break:
                 raise RuntimeError("the simulator fell over")
             return play_segment(block, agent, stitcher, *rest)
 
-        monkeypatch.setattr(worker, "play_segment", faulty)
+        monkeypatch.setattr(playing, "play_segment", faulty)
 
     yield break_blocks
-    monkeypatch.setattr(worker, "play_segment", play_segment)
+    monkeypatch.setattr(playing, "play_segment", play_segment)
 
 
 @pytest.mark.parametrize("times", [1, ATTEMPTS - 1])

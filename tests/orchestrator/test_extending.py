@@ -12,15 +12,25 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from orchestrator.plan import make_plan
+from orchestrator.rundir import describe
+from orchestrator.spec import load_spec
+
 EXAMPLE = Path(__file__).parents[2] / "docs" / "example"
 METHODS = ("no-stitch", "hold-stitch", "mb-stitch", "mb-stitch[planner=hold-shooting]")
-NAMES = """
+RUN = (
+    "run", "track.toml", "--scale", "smoke", "--out", "run", "--store", "store",
+    "--tracking-uri", "none", "--workers", "1",
+)  # fmt: skip
+NAMES = f"""
 import json
+from dataclasses import replace
 from orchestrator.plan import make_plan
 from orchestrator.spec import load_spec
-plan = make_plan(load_spec("track.toml", "smoke"))
-names = {node.method: task.key for (node, _), task in plan.tasks.items()}
-print(json.dumps(names | {"recipes": sorted(plan.recipes)}))
+spec = load_spec("table1", "smoke")
+plan = make_plan(replace(spec, methods={METHODS}))
+names = {{node.method: task.key for (node, _), task in plan.tasks.items()}}
+print(json.dumps(names | {{"recipes": sorted(plan.recipes)}}))
 """
 
 
@@ -51,24 +61,21 @@ def run(folder: Path, *command: str) -> str:
 
 
 @contextmanager
-def edited(folder: Path, old: str, new: str) -> Iterator[None]:
-    module = folder / "site" / "hold_stitch.py"
-    text = module.read_text()
+def edited(folder: Path, module: str, old: str, new: str) -> Iterator[None]:
+    file = folder / "site" / module
+    text = file.read_text()
     assert old in text
-    module.write_text(text.replace(old, new, 1))
+    file.write_text(text.replace(old, new, 1))
     try:
         yield
     finally:
-        module.write_text(text)
+        file.write_text(text)
 
 
 @pytest.mark.slow
 @pytest.mark.ray
 def test_a_table_of_its_own_parts_is_played_through_ray(place: Path) -> None:
-    run(
-        place, "-m", "orchestrator.cli", "run", "track.toml", "--scale", "smoke", "--out", "run",
-        "--store", "store", "--tracking-uri", "none", "--workers", "1",
-    )  # fmt: skip
+    run(place, "-m", "orchestrator.cli", *RUN)
     episodes = pd.read_parquet(place / "run" / "episodes.parquet")
     assert set(episodes["method"]) == set(METHODS)
     assert set(episodes["task"]) >= {"left>middle", "right>left"}
@@ -77,25 +84,53 @@ def test_a_table_of_its_own_parts_is_played_through_ray(place: Path) -> None:
     table = (place / "run" / "report" / "track.md").read_text()
     assert "Hold-Stitch" in table
     assert "planner=hold-shooting" in table
+    with edited(place, "hold_stitch.py", "axis=1", "axis=-2"):
+        refused = called(place, "-m", "orchestrator.cli", *RUN)
+    assert refused.returncode == 5
+    assert "code that plays Hold-Stitch: " in refused.stderr
+    assert "code that plays shared first skills" not in refused.stderr
 
 
 def test_its_own_tests_pass(place: Path) -> None:
     run(place, "-m", "pytest", "-q", "-p", "no:cacheprovider", "source")
 
 
-def test_an_edit_names_what_it_plays_anew_and_nothing_else(place: Path) -> None:
+def test_an_edit_names_what_the_package_plays_anew_and_nothing_else(place: Path) -> None:
     before = json.loads(run(place, "-c", NAMES))
-    with edited(place, "scores.argmax(dim=1)", "scores.argmin(dim=1)"):
+    with edited(place, "hold_shooting.py", "argmax", "argmin"):
         after = json.loads(run(place, "-c", NAMES))
-    assert before["recipes"] == after["recipes"]
     changed = {name for name in before if before[name] != after[name]}
     assert changed == {"hold-stitch", "mb-stitch[planner=hold-shooting]"}
 
 
+def test_what_is_not_used_leaves_no_trace(place: Path) -> None:
+    """Neither in names nor in what a run directory keeps: it is read without the package."""
+    code = """
+import json
+from orchestrator.plan import make_plan
+from orchestrator.rundir import describe
+from orchestrator.spec import load_spec
+spec = load_spec("table1", "smoke")
+plan = make_plan(spec)
+keys = [task.key for task in plan.tasks.values()]
+print(json.dumps([describe(spec), sorted(plan.recipes), keys]))
+"""
+    with_package = json.loads(run(place, "-c", code))
+    spec = load_spec("table1", "smoke")
+    plan = make_plan(spec)
+    here = [describe(spec), sorted(plan.recipes), [task.key for task in plan.tasks.values()]]
+    assert with_package == json.loads(json.dumps(here))
+
+
 def test_a_package_that_cannot_be_used_is_named(place: Path) -> None:
-    with edited(place, "import annotations\n", "import annotations\nimport no_such_module\n"):
+    with edited(
+        place,
+        "hold_stitch.py",
+        "import annotations\n",
+        "import annotations\nimport nothing_so_called\n",
+    ):
         failed = called(place, "-m", "orchestrator.cli", "plan", "table1", "--scale", "smoke")
     assert failed.returncode == 2
     assert len(failed.stderr.splitlines()) == 1
     assert "error: skillstitch-example, entry point 'hold-s" in failed.stderr
-    assert "No module named 'no_such_module'; mend or uninstall it" in failed.stderr
+    assert "No module named 'nothing_so_called'; mend or uninstall it" in failed.stderr

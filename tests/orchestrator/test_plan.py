@@ -1,14 +1,18 @@
 """The plan: every prefix once, first skills shared, and a change re-plays only what it touches."""
 
+import importlib.util
 from dataclasses import replace
 from itertools import permutations
 from typing import get_args
 
 import pytest
 
+from orchestrator.artifacts import MODELS
 from orchestrator.benchmarks.registry import BENCHMARKS
-from orchestrator.builders.registry import BLOCK_CODE, BLOCK_SETUP
-from orchestrator.methods import first_method
+from orchestrator.builders.models import LOADERS
+from orchestrator.builders.registry import BLOCK_CODE, BLOCK_SETUP, BUILDERS
+from orchestrator.errors import UsageError
+from orchestrator.methods import first_method, playing_modules
 from orchestrator.plan import Node, Plan, make_plan
 from orchestrator.recipes import _closure
 from orchestrator.spec import Spec, load_spec
@@ -143,9 +147,44 @@ def test_more_seeds_methods_or_tasks_touch_nothing(plan: Plan, spec: Spec) -> No
     )  # it shows other methods
 
 
-@pytest.mark.parametrize("module", [*BLOCK_CODE, *BLOCK_SETUP, "stitching.planning.objective"])
-def test_blocks_are_named_by_the_code_that_plays_them(module: str) -> None:
-    assert module in _closure(BLOCK_CODE) | set(BLOCK_SETUP)
+@pytest.mark.parametrize(
+    ("method", "own", "others"),
+    [
+        ("no-stitch", ["methods.no_stitch"], ["methods.random_stitch", "planning.cem"]),
+        (
+            "mb-stitch",  # with random shooting here
+            ["methods.mb_stitch", "methods.planning", "planning.objective", "models.dynamics",
+             "planning.random_shooting"],
+            ["planning.cem", "methods.random_stitch", "methods.reach_stitch"],
+        ),
+        ("single-policy", ["methods.single_policy", "methods.no_stitch"], ["methods.mb_stitch"]),
+    ],
+)  # fmt: skip
+def test_blocks_are_named_by_the_code_that_plays_them(
+    spec: Spec, method: str, own: list[str], others: list[str]
+) -> None:
+    """By all of it: a list that somebody keeps would let an edit reuse stale results."""
+    played = _closure((*BLOCK_CODE, *playing_modules(method, spec.method_settings(method))))
+    assert {f"stitching.{name}" for name in (*own, "rollout", "envs.first_times")} <= played
+    assert not {f"stitching.{name}" for name in others} & played
+    assert all(importlib.util.find_spec(module) for module in BLOCK_SETUP)
+
+
+def test_settings_without_effect_name_nothing(spec: Spec, plan: Plan) -> None:
+    method = "mb-stitch[cem.horizon=9]"  # under random shooting
+    other = make_plan(replace(spec, methods=("no-stitch", method)))
+    theirs = {(node.seed, node.prefix): task.key for (node, _), task in other.tasks.items()
+              if node.method == method}  # fmt: skip
+    ours = {(node.seed, node.prefix): task.key for (node, _), task in plan.tasks.items()
+            if node.method == "mb-stitch"}  # fmt: skip
+    assert theirs
+    assert theirs == {place: ours[place] for place in theirs}
+    with pytest.raises(UsageError, match="are the same method"):
+        replace(spec, methods=("mb-stitch", method))
+
+
+def test_what_can_be_read_can_be_made() -> None:
+    assert MODELS.keys() == LOADERS.keys() <= BUILDERS.keys()
 
 
 def test_only_a_fine_tuned_stitch_depends_on_the_agent(spec: Spec) -> None:

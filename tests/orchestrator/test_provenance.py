@@ -2,12 +2,15 @@
 
 import json
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from orchestrator import provenance as module
+from orchestrator.plan import make_plan
 from orchestrator.provenance import git_revision, matters, provenance
+from tests.orchestrator.tiny import tiny_spec
 
 
 def test_everything_a_reviewer_asks_for() -> None:
@@ -18,9 +21,13 @@ def test_everything_a_reviewer_asks_for() -> None:
 
 
 def test_what_matters_names_code_and_packages() -> None:
-    code = {name for name in matters(["agent"]) if name.startswith("code")}
-    assert code == {"code that makes agent", "code that makes blocks"}
-    assert {"numpy", "torch"} <= matters([]).keys()
+    plan = make_plan(replace(tiny_spec(), methods=("no-stitch", "mb-stitch")))
+    named = matters([plan])
+    assert {name.removeprefix("code that ") for name in named if name.startswith("code")} == {
+        "makes agent", "makes dynamics", "makes maze-demonstrations", "makes maze-exploration",
+        "plays shared first skills", "plays No-Stitch", "plays MB-Stitch",
+    }  # fmt: skip
+    assert {"numpy", "torch", "robosuite"} <= matters([]).keys()
 
 
 def test_the_revision_is_marked_when_sources_changed(

@@ -25,7 +25,7 @@ Write = Callable[[str, str], None]
 def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Write]:
     """Writes a module of a package that stands in for `stitching`."""
     monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr(recipes, "METHOD_PACKAGE", "method_under_test")
+    monkeypatch.setattr(recipes, "OUR_PACKAGE", "method_under_test")
 
     def write(name: str, source: str) -> None:
         folder = tmp_path / "method_under_test"
@@ -78,6 +78,40 @@ def test_imported_code_matters_and_other_code_does_not(write: Write, statement: 
     assert fingerprint() == before
     write("below", "def g(x):\n    return -x\n")
     assert fingerprint() != before
+
+
+@pytest.fixture
+def other(tmp_path: Path, write: Write) -> Write:
+    """Writes a module of a package that is not ours."""
+
+    def other(name: str, source: str) -> None:
+        folder = tmp_path / "elsewhere"
+        folder.mkdir(exist_ok=True)
+        (folder / f"{name}.py").write_text(textwrap.dedent(source))
+        clear()
+
+    write("below", "def g(x):\n    return x\n")
+    other("__init__", "from .part import HOLD\n")
+    other("part", "from . import helper\nfrom method_under_test.below import g\nHOLD = 1\n")
+    other("helper", "def f(x):\n    return x\n")
+    return other
+
+
+@pytest.mark.parametrize("name", ["__init__", "part", "helper", "new"])
+def test_of_another_package_everything_counts(other: Write, name: str) -> None:
+    before = code_fingerprint(("elsewhere.part",))
+    other("helper", "# why\ndef f(x):\n    return x\n")
+    assert code_fingerprint(("elsewhere.part",)) == before
+    other(name, "X = 2\n")
+    assert code_fingerprint(("elsewhere.part",)) != before
+
+
+def test_what_another_package_needs_of_ours_counts(other: Write, write: Write) -> None:
+    before = code_fingerprint(("elsewhere.part",))
+    write("aside", "def h(x):\n    return x\n")
+    assert code_fingerprint(("elsewhere.part",)) == before
+    write("below", "def g(x):\n    return -x\n")
+    assert code_fingerprint(("elsewhere.part",)) != before
 
 
 def test_a_key_names_all_that_made_an_artifact() -> None:

@@ -10,7 +10,7 @@ from unittest import mock
 import pandas as pd
 import pytest
 
-from orchestrator import worker
+from orchestrator import playing
 from orchestrator.cli import main
 from orchestrator.errors import ChangedError, IncompleteError, LockedError, UsageError
 from orchestrator.merge import (
@@ -174,7 +174,7 @@ def test_a_part_that_gives_up_blocks(
 ) -> None:
     shutil.rmtree(done / "out")
     (done / "store" / "blocks.sqlite").unlink()
-    play = worker.play_segment
+    play = playing.play_segment
     second = levels().parts[1].spec
 
     def faulty(*arguments: Any) -> Any:
@@ -182,7 +182,7 @@ def test_a_part_that_gives_up_blocks(
             raise RuntimeError("the simulator fell over")
         return play(*arguments)
 
-    monkeypatch.setattr(worker, "play_segment", faulty)
+    monkeypatch.setattr(playing, "play_segment", faulty)
     with pytest.raises(IncompleteError, match="blocks of level-1, level-2 were given up"):
         carry_out(levels(), done)
     text = (done / "out" / "report" / "levels.md").read_text()

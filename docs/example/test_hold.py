@@ -2,7 +2,8 @@
 
 import pytest
 import torch
-from hold_stitch import HOLD_STITCH, HoldShooting, HoldStitchSettings
+from hold_shooting import HoldShooting
+from hold_stitch import HOLD_STITCH, HoldStitchSettings
 from torch import Tensor
 
 from stitching.envs.protocol import ActionSpace
