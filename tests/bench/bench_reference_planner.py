@@ -40,6 +40,7 @@ from orchestrator.builders.models import load_models
 from orchestrator.rundir import RunDirectory
 from orchestrator.spec import Spec, load_spec
 from orchestrator.store import Arrays, Artifact, Store
+from orchestrator.structure import to_plain
 from stitching.data.transitions import Transitions, concatenate
 from stitching.envs.kitchen import KITCHEN
 from stitching.methods.mb_stitch import MBStitch, MBStitchSettings
@@ -294,8 +295,9 @@ def _setting(run: Path | None) -> Setting:
 def _stitcher(
     models: dict[str, Arrays], config: DynamicsConfig, settings: MBStitchSettings
 ) -> MBStitch:
-    artifacts = {kind: Artifact(arrays, {}) for kind, arrays in models.items()}
-    return MBStitch(settings, load_models(KITCHEN, {"dynamics": config}, artifacts))
+    info = {"config": to_plain(config)}
+    artifacts = {kind: Artifact(arrays, info) for kind, arrays in models.items()}
+    return MBStitch(settings, load_models(KITCHEN, artifacts))
 
 
 def _of_run(run: Path) -> tuple[dict[str, Arrays], DynamicsConfig, Transitions]:

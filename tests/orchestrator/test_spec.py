@@ -127,7 +127,7 @@ def test_the_spec_below_is_sound(tmp_path: Path) -> None:
         (SOUND + "rollout = " + 9999 * "[", "not valid TOML"),
         (MF + "mixture = 'both'", "mixture: 'both' is not one of halves, joined"),
         (MF + "training.policy_width = 7", r"layers of \[7, 7\] cannot be fine-tuned from"),
-        (MF + "[agent]\nmulti_task = false", "fine-tuned pair by pair; set training.multi_task"),
+        (MF + "[agent]\nmulti_task = false", "fine-tuned pair by pair; set multi_task"),
         (SOUND + "agent.swap = 0.5", "agent: what maze shows does not tell its robot"),
         (SOUND + "agent.corrections = 1.5", "agent: what maze shows does not tell its robot"),
         (SOUND + "agent.swap = 1.5", "agent, swap: must be at most 1: 1.5"),

@@ -40,7 +40,7 @@ def test_a_policy_brings_its_pairs_conditions(
     assert set(made.info["curves"]) >= {"value_loss", "policy_loss"}
     assert [update for update, _ in made.info["curves"]["policy_loss"]] == [20, 40]
     assert not any(" of " in name for name in made.info["curves"])
-    policy = load_models(MAZE, {}, {"mf-policy": made}).trained["mf-policy"]
+    policy = load_models(MAZE, {"mf-policy": made}).trained["mf-policy"]
     for pair in range(12):
         assert policy.act(STATES, pair, noise=None).shape == (len(STATES), 4)
 
@@ -50,7 +50,7 @@ def test_fine_tuning_begins_as_the_next_skill(multi_task: bool) -> None:
     taught = built("agent", replace(SKILLS, multi_task=multi_task), {})
     untuned = replace(SKILLS, multi_task=multi_task, updates=0)
     made = built("mf-policy", untuned, {"agent": taught}, mixture="fine-tuned")
-    models = load_models(MAZE, {}, {"agent": taught, "mf-policy": made})
+    models = load_models(MAZE, {"agent": taught, "mf-policy": made})
     for pair, (_, following) in enumerate(skill_pairs(4)):
         actions = models.trained["mf-policy"].act(STATES, pair, noise=None)
         assert np.array_equal(actions, models.agent.act(STATES, following, noise=None))
@@ -112,7 +112,7 @@ def test_initiation_sets_know_which_objects_their_skills_are_not_about() -> None
     )
     recipe = {"benchmark": "kitchen", "factors": to_plain(KITCHEN.factors)}
     made = BUILDERS["initiation-sets"].make(recipe, {"demonstrations": as_artifact(data)})
-    sets = load_models(KITCHEN, {}, {"initiation-sets": made}).trained["initiation-sets"]
+    sets = load_models(KITCHEN, {"initiation-sets": made}).trained["initiation-sets"]
     assert sets.columns == list(KITCHEN.factors.pose)
     for number, skill in enumerate(KITCHEN.skills):
         assert sets.others[number] == KITCHEN.factors.others_than(skill.name)

@@ -151,7 +151,7 @@ class Alone:
         benchmark = BENCHMARKS[spec.benchmark]
         task = self.plan.tasks[Node(self.seed, self.method, self.task), self.chunk]
         artifacts = {kind: self.place.store.read(kind, key) for kind, key in task.artifacts.items()}
-        models = load_models(benchmark, task.configs, artifacts)
+        models = load_models(benchmark, artifacts)
         method = method_of(self.method)
         agent = models.one(method.policy, Agent)
         return play_from_start(
