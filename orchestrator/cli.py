@@ -16,7 +16,7 @@ from rich.console import Console
 
 from orchestrator.errors import SkillstitchError, UsageError, said_to_users
 from orchestrator.interruption import interrupted_by_sigterm
-from orchestrator.tomls import packaged_specs
+from orchestrator.spec.tomls import packaged_specs
 from stitching.registry import PartError
 
 INTERRUPTED, UNREAD, TERMINATED = 130, 141, 143  # as shells count SIGINT, SIGPIPE and SIGTERM
@@ -93,9 +93,9 @@ def _sweep(words: list[str]) -> None:
 
 def _status(words: list[str]) -> None:
     from orchestrator.printing import status_lines, suite_status_lines
-    from orchestrator.reproduce import catch_up
-    from orchestrator.rundir import RunDirectory
-    from orchestrator.suite import is_suite, part_directories
+    from orchestrator.spec.suite import is_suite, part_directories
+    from orchestrator.storage.rundir import RunDirectory
+    from orchestrator.work.reproduce import catch_up
 
     def status(run: tyro.conf.Positional[Path], store: Path | None = None) -> None:
         """How far a run directory is.
@@ -116,7 +116,7 @@ def _status(words: list[str]) -> None:
 
 
 def _list(words: list[str]) -> None:
-    from orchestrator.listing import listing_lines
+    from orchestrator.storage.listing import listing_lines
 
     def list_(folder: tyro.conf.Positional[Path] = Path("runs")) -> None:
         """Every run and sweep in a folder: what was asked, how far it is, when it last went on.
@@ -132,11 +132,11 @@ def _list(words: list[str]) -> None:
 
 def _report(words: list[str]) -> None:
     from analysis.report import build_report
-    from orchestrator.merge import merge_again
-    from orchestrator.reproduce import catch_up
-    from orchestrator.rundir import RunDirectory
+    from orchestrator.spec.suite import is_suite
     from orchestrator.spec_commands import export
-    from orchestrator.suite import is_suite
+    from orchestrator.storage.merge import merge_again
+    from orchestrator.storage.rundir import RunDirectory
+    from orchestrator.work.reproduce import catch_up
 
     def report(
         run: tyro.conf.Positional[Path], results: Path | None = None, force: bool = False
@@ -212,8 +212,8 @@ def _doctor(words: list[str]) -> None:
 
 
 def _gc(words: list[str]) -> None:
-    from orchestrator.gc import collect_garbage
-    from orchestrator.store import USUAL_STORE
+    from orchestrator.storage.gc import collect_garbage
+    from orchestrator.storage.store import USUAL_STORE
 
     def gc(
         runs: tyro.conf.Positional[tuple[Path, ...]],

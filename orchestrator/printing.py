@@ -7,14 +7,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from orchestrator.cores import usable_cores
-from orchestrator.costs import Estimate, estimate
-from orchestrator.ledger import Ledger
-from orchestrator.methods import method_label
-from orchestrator.plan import Plan, make_plan
-from orchestrator.rundir import RunDirectory
-from orchestrator.spec import Spec
-from orchestrator.store import CorruptArtifactError, Store
-from orchestrator.suite import Suite, part_directories
+from orchestrator.spec.methods import method_label
+from orchestrator.spec.spec import Spec
+from orchestrator.spec.suite import Suite, part_directories
+from orchestrator.storage.ledger import Ledger
+from orchestrator.storage.rundir import RunDirectory
+from orchestrator.storage.store import CorruptArtifactError, Store
+from orchestrator.work.costs import Estimate, estimate
+from orchestrator.work.plan import Plan, make_plan
 
 
 def plan_lines(spec: Spec, costs: Estimate, workers: int | None) -> Iterator[str]:

@@ -12,10 +12,10 @@ from rich.console import Console
 
 from orchestrator.errors import IncompleteError, UsageError, said_to_users
 from orchestrator.executors import ExecutorKind
-from orchestrator.spec import Spec
-from orchestrator.store import USUAL_STORE
-from orchestrator.suite import Suite, load_asked, with_specs
-from orchestrator.tomls import packaged_specs
+from orchestrator.spec.spec import Spec
+from orchestrator.spec.suite import Suite, load_asked, with_specs
+from orchestrator.spec.tomls import packaged_specs
+from orchestrator.storage.store import USUAL_STORE
 
 OfSpec = Annotated[Spec, tyro.conf.arg(name="")]  # spec fields are options of the command itself
 
@@ -90,12 +90,12 @@ def _option(words: list[str], name: str) -> str:
 
 def plan(words: list[str], output: Console) -> None:
     """`skillstitch plan SPEC [options]`."""
-    from orchestrator.costs import estimate
-    from orchestrator.ledger import Ledger
-    from orchestrator.plan import make_plan
     from orchestrator.printing import forecast_lines, plan_lines, suite_plan_lines
-    from orchestrator.reproduce import check_workers
-    from orchestrator.store import Store
+    from orchestrator.storage.ledger import Ledger
+    from orchestrator.storage.store import Store
+    from orchestrator.work.costs import estimate
+    from orchestrator.work.plan import make_plan
+    from orchestrator.work.reproduce import check_workers
 
     command, asked = _with_spec(PlanCommand, "plan", words)
     check_workers(command.workers)
@@ -112,10 +112,10 @@ def plan(words: list[str], output: Console) -> None:
 def run(words: list[str], output: Console, errors: Console) -> None:
     """`skillstitch run SPEC [options]`."""
     from orchestrator.printing import summary_lines
-    from orchestrator.progress import ConsoleProgress
-    from orchestrator.reproduce import Settings, reproduce
-    from orchestrator.reproduce_suite import reproduce_suite
-    from orchestrator.rundir import RunDirectory, default_out
+    from orchestrator.storage.rundir import RunDirectory, default_out
+    from orchestrator.work.progress import ConsoleProgress
+    from orchestrator.work.reproduce import Settings, reproduce
+    from orchestrator.work.reproduce_suite import reproduce_suite
 
     command, asked = _with_spec(RunCommand, "run", words)
     out = command.out or default_out(asked)
@@ -155,7 +155,7 @@ def run(words: list[str], output: Console, errors: Console) -> None:
 def export(run: Path, results: Path, output: Console, *, force: bool) -> None:
     """Copy a run's tables, figures and report to RESULTS/<table>/."""
     from analysis.report import export_results
-    from orchestrator.rundir import RunDirectory
+    from orchestrator.storage.rundir import RunDirectory
 
     with RunDirectory(run).locked(), said_to_users():
         folders = export_results(run, results, force=force)

@@ -12,18 +12,18 @@ import pandas as pd
 
 from analysis.episodes import episodes_from_segments
 from analysis.run import RunSpec
-from orchestrator.building import Builds, verified_artifacts
 from orchestrator.errors import IncompleteError
-from orchestrator.evaluation import Evaluation
 from orchestrator.executors.protocol import Executor
-from orchestrator.exports import quarantine, segments_frame
-from orchestrator.jobs import BuildJob, Job, PlayJob, Report
-from orchestrator.ledger import Ledger, Outcome
-from orchestrator.plan import Plan, make_plan
-from orchestrator.progress import Progress, Silent
-from orchestrator.rundir import describe
-from orchestrator.spec import Spec
-from orchestrator.store import Artifact, Store
+from orchestrator.spec.spec import Spec
+from orchestrator.storage.exports import quarantine, segments_frame
+from orchestrator.storage.ledger import Ledger, Outcome
+from orchestrator.storage.rundir import describe
+from orchestrator.storage.store import Artifact, Store
+from orchestrator.work.building import Builds, verified_artifacts
+from orchestrator.work.evaluation import Evaluation
+from orchestrator.work.jobs import BuildJob, Job, PlayJob, Report
+from orchestrator.work.plan import Plan, make_plan
+from orchestrator.work.progress import Progress, Silent
 
 SHARED = "first skills, shared"
 """Segments of no one method; a first skill that is stitched to is of the method that does."""

@@ -6,8 +6,8 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from orchestrator.methods import method_name, settings_with_effect
-from orchestrator.spec import Spec
+from orchestrator.spec.methods import method_name, settings_with_effect
+from orchestrator.spec.spec import Spec
 from sweeps.space import Fields, Value, replaced
 
 OURS = "mb_stitch."

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from orchestrator.spec import Spec
-from orchestrator.structure import Plain
+from orchestrator.spec.spec import Spec
+from orchestrator.spec.structure import Plain
 from sweeps.arena import Arena
 from sweeps.space import describe
 from sweeps.spec import SweepSpec, base_spec, split_tasks

@@ -6,11 +6,11 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from orchestrator.costs import Estimate, estimate
-from orchestrator.ledger import Ledger
-from orchestrator.plan import make_plan
-from orchestrator.spec import Spec
-from orchestrator.store import Store
+from orchestrator.spec.spec import Spec
+from orchestrator.storage.ledger import Ledger
+from orchestrator.storage.store import Store
+from orchestrator.work.costs import Estimate, estimate
+from orchestrator.work.plan import make_plan
 from sweeps.search import search_spec
 from sweeps.spec import SweepSpec
 

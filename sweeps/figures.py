@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 from analysis.figures.style import COLOURS, FAINT, INK, house_style, new_figure, save
 from analysis.paper import paper_scores
-from orchestrator.structure import Plain
+from orchestrator.spec.structure import Plain
 from sweeps.questions import METRICS
 from sweeps.scoring import pareto_front
 from sweeps.spec import SweepSpec

@@ -16,8 +16,8 @@ from analysis.report import export_results
 from analysis.results import check_results, provenance_text
 from analysis.run import leaves
 from analysis.writers import to_csv
-from orchestrator.rundir import RunDirectory
-from orchestrator.structure import Plain
+from orchestrator.spec.structure import Plain
+from orchestrator.storage.rundir import RunDirectory
 from sweeps.confirm import confirm_spec
 from sweeps.figures import draw_figures
 from sweeps.questions import METRICS

@@ -17,9 +17,9 @@ import numpy as np
 import pandas as pd
 
 from analysis.statistics import Gain, generator, paired_differences, paired_gain
-from orchestrator.methods import first_method
-from orchestrator.spec import Spec
-from orchestrator.structure import Plain
+from orchestrator.spec.methods import first_method
+from orchestrator.spec.spec import Spec
+from orchestrator.spec.structure import Plain
 from stitching.methods.mb_stitch import MBStitchSettings
 from sweeps.arena import Arena, Played
 from sweeps.candidates import NO_STITCH, group

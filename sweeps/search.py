@@ -10,9 +10,9 @@ from math import ceil
 import numpy as np
 from optuna.trial import FrozenTrial
 
-from orchestrator.progress import Progress
-from orchestrator.spec import Spec
-from orchestrator.structure import Plain
+from orchestrator.spec.spec import Spec
+from orchestrator.spec.structure import Plain
+from orchestrator.work.progress import Progress
 from stitching.streams import stream
 from sweeps.arena import Arena
 from sweeps.questions.question import Showing

@@ -15,8 +15,8 @@ from optuna.distributions import (
 )
 
 from orchestrator.errors import UsageError
-from orchestrator.spec import Spec, spec_from_plain
-from orchestrator.structure import Plain, merged, nested, to_plain
+from orchestrator.spec.spec import Spec, spec_from_plain
+from orchestrator.spec.structure import Plain, merged, nested, to_plain
 from stitching.bounds import Bounded, FewOrNone
 
 Value = int | float | bool | str

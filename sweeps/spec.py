@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any, Literal
 
 from orchestrator.errors import UsageError
-from orchestrator.spec import (
+from orchestrator.spec.spec import (
     Spec,
     TableSpec,
     load_spec,
     spec_from_plain,
 )
-from orchestrator.structure import Plain, merged, settings_of, structure, to_plain
-from orchestrator.tomls import Scale, load_toml, toml_names
+from orchestrator.spec.structure import Plain, merged, settings_of, structure, to_plain
+from orchestrator.spec.tomls import Scale, load_toml, toml_names
 from stitching.bounds import (
     Amount,
     Bounded,

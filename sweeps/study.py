@@ -26,7 +26,7 @@ from optuna.study import StudyDirection
 from optuna.trial import FrozenTrial, TrialState, create_trial
 
 from orchestrator.errors import ChangedError, StorageError
-from orchestrator.store import storage_errors
+from orchestrator.storage.store import storage_errors
 from stitching.streams import stream
 from sweeps.questions import METRICS
 from sweeps.space import Fields, current, describe

@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from orchestrator import locking
 from orchestrator.errors import ChangedError, UsageError
-from orchestrator.progress import Progress
-from orchestrator.provenance import provenance
-from orchestrator.reproduce import LazyExecutor, Settings
-from orchestrator.rundir import SWEEP, RunDirectory
-from orchestrator.store import storage_errors
-from orchestrator.structure import Plain, structure, to_plain
+from orchestrator.spec.structure import Plain, structure, to_plain
+from orchestrator.storage import locking
+from orchestrator.storage.provenance import provenance
+from orchestrator.storage.rundir import SWEEP, RunDirectory
+from orchestrator.storage.store import storage_errors
+from orchestrator.work.progress import Progress
+from orchestrator.work.reproduce import LazyExecutor, Settings
 from sweeps.arena import Arena, Tally
 from sweeps.confirm import confirm
 from sweeps.report import write_report

@@ -6,11 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from analysis.report import build_report
-from orchestrator.exports import write_readable
-from orchestrator.plan import make_plan
-from orchestrator.provenance import provenance
-from orchestrator.rundir import RunDirectory, describe
-from orchestrator.spec import Spec
+from orchestrator.spec.spec import Spec
+from orchestrator.storage.exports import write_readable
+from orchestrator.storage.provenance import provenance
+from orchestrator.storage.rundir import RunDirectory, describe
+from orchestrator.work.plan import make_plan
 from sweeps.arena import Arena
 from sweeps.candidates import NO_STITCH, group
 from sweeps.search import search_spec

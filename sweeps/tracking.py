@@ -5,16 +5,16 @@ from __future__ import annotations
 import time
 
 from analysis.run import leaves
-from orchestrator.progress import Progress
-from orchestrator.reproduce import NO_TRACKING
-from orchestrator.rundir import RunDirectory
-from orchestrator.structure import Plain
+from orchestrator.spec.structure import Plain
+from orchestrator.storage.rundir import RunDirectory
 from orchestrator.tracking.metrics import finite
 from orchestrator.tracking.names import allowed_name, short_text
 from orchestrator.tracking.receipt import Status
 from orchestrator.tracking.stores import connect, open_experiment, turn_to_write
 from orchestrator.tracking.views import RunView
 from orchestrator.tracking.writing import Publisher
+from orchestrator.work.progress import Progress
+from orchestrator.work.reproduce import NO_TRACKING
 
 HIDDEN = ("fields", "trial", "tasks")  # of a trial's numbers
 SECONDS_BETWEEN = 60.0  # of publications while the search goes on

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import get_args
 
 from orchestrator.errors import UsageError
-from orchestrator.rundir import RunDirectory
-from orchestrator.spec import Spec
-from orchestrator.structure import Plain
-from orchestrator.tomls import Scale
+from orchestrator.spec.spec import Spec
+from orchestrator.spec.structure import Plain
+from orchestrator.spec.tomls import Scale
+from orchestrator.storage.rundir import RunDirectory
 from sweeps.space import replaced
 
 RUNS = Path("runs")

@@ -9,8 +9,8 @@ import numpy as np
 
 from orchestrator.benchmarks.kit import Costs, Dataset, Kit
 from orchestrator.builders.parts import Builder, Inputs, as_artifact
-from orchestrator.store import Artifact
-from orchestrator.structure import Plain, structure
+from orchestrator.spec.structure import Plain, structure
+from orchestrator.storage.store import Artifact
 from stitching.bounds import Bounded, Episodes, Share
 from stitching.data.transitions import Transitions
 from stitching.envs.factors import Factors

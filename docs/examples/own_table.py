@@ -1,11 +1,12 @@
-"""A table of one's own: two tasks, three settings of the planner, from demonstrations of one's own."""
+"""A table of one's own: two tasks, two prices of disagreement, other demonstrations."""
 
 import sys
 from dataclasses import replace
 from pathlib import Path
 
 from analysis import open_run
-from orchestrator import load_spec, reproduce
+from orchestrator import load_spec
+from orchestrator.work import reproduce
 from stitching.data.maze import MazeDataConfig
 
 where = Path(sys.argv[1] if len(sys.argv) > 1 else "example-runs")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from orchestrator.builders.parts import Builder
-from orchestrator.structure import Plain
+from orchestrator.spec.structure import Plain
 from stitching.bounds import Bounded
 from stitching.envs.protocol import Benchmark
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from orchestrator.builders.parts import Builder, Inputs, as_artifact
-from orchestrator.store import Artifact
-from orchestrator.structure import Plain, structure
+from orchestrator.spec.structure import Plain, structure
+from orchestrator.storage.store import Artifact
 from stitching.data.kitchen.demonstrations import KitchenDataConfig, held_out, kept, play
 from stitching.data.kitchen.human import human_demonstrations
 from stitching.data.kitchen.segments import Segment, as_transitions, shown_orders

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from orchestrator.builders.parts import Builder, Inputs, as_artifact
-from orchestrator.store import Artifact
-from orchestrator.structure import Plain, structure
+from orchestrator.spec.structure import Plain, structure
+from orchestrator.storage.store import Artifact
 from stitching.data.maze import MazeDataConfig, exploration, skill_demonstrations
 from stitching.envs.maze import MAZE
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import Any
 
 from orchestrator.builders.parts import Inputs
-from orchestrator.store import Artifact
-from orchestrator.structure import structure
+from orchestrator.spec.structure import structure
+from orchestrator.storage.store import Artifact
 from stitching.data.uncut import no_conditions
 from stitching.envs.protocol import Benchmark, conditions
 from stitching.methods.protocol import Models

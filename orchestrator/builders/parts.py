@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orchestrator.store import Artifact
-from orchestrator.structure import Plain
+from orchestrator.spec.structure import Plain
+from orchestrator.storage.store import Artifact
 from stitching.data.transitions import Transitions
 
 Inputs = Mapping[str, Artifact]  # by role

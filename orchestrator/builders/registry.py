@@ -16,4 +16,8 @@ BUILDERS: dict[str, Builder] = reduce(
 # What decides a block's outcome beside its method and its models: Algorithm 1, and what counts.
 BLOCK_CODE = ("stitching.rollout", "stitching.envs.first_times")
 # What sets it up, without what these import for other purposes.
-BLOCK_SETUP = ("orchestrator.builders.models", "orchestrator.methods", "orchestrator.playing")
+BLOCK_SETUP = (
+    "orchestrator.builders.models",
+    "orchestrator.spec.methods",
+    "orchestrator.work.playing",
+)

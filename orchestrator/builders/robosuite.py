@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from orchestrator.builders.parts import Builder, Inputs, as_artifact
-from orchestrator.store import Artifact
-from orchestrator.structure import Plain, structure
+from orchestrator.spec.structure import Plain, structure
+from orchestrator.storage.store import Artifact
 from stitching.data.robosuite.demonstrations import RobosuiteDataConfig, collect, held_out
 from stitching.envs.robosuite.can import CAN, Can
 from stitching.envs.robosuite.door import DOOR, Door

@@ -11,9 +11,9 @@ from typing import Any
 
 from orchestrator.builders.models import load_models
 from orchestrator.builders.parts import Builder, Inputs
-from orchestrator.methods import method_of
-from orchestrator.store import Artifact
-from orchestrator.structure import Plain, structure
+from orchestrator.spec.methods import method_of
+from orchestrator.spec.structure import Plain, structure
+from orchestrator.storage.store import Artifact
 from stitching.anatomy import Subject, anatomy
 from stitching.data.transitions import Transitions, concatenate
 from stitching.diagnosis import competence, prediction_errors, prices, value_progress
@@ -52,7 +52,11 @@ def _shown(benchmark: Benchmark, params: Plain, inputs: Inputs) -> Shown:
 
 
 PLAYED = tuple(sorted(NO_STITCH.modules | MB_STITCH.modules))  # planners: see the recipes
-SETUP = ("orchestrator.builders.studies", "orchestrator.builders.models", "orchestrator.methods")
+SETUP = (
+    "orchestrator.builders.studies",
+    "orchestrator.builders.models",
+    "orchestrator.spec.methods",
+)
 
 
 def maze_showcase_builder(maze: Maze) -> Builder:

@@ -8,8 +8,8 @@ import numpy as np
 
 from orchestrator.benchmarks.registry import BENCHMARKS
 from orchestrator.builders.parts import Builder, Inputs
-from orchestrator.store import Artifact
-from orchestrator.structure import Plain, structure
+from orchestrator.spec.structure import Plain, structure
+from orchestrator.storage.store import Artifact
 from stitching.data.corrections import Corrections
 from stitching.data.experience import skill_experience
 from stitching.data.initiation import initiation_set, pose_scale

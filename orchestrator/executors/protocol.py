@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from orchestrator.jobs import Job, Report
-from orchestrator.store import Artifact
+from orchestrator.storage.store import Artifact
+from orchestrator.work.jobs import Job, Report
 
 
 class Executor(Protocol):

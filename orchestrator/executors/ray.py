@@ -12,8 +12,8 @@ from typing import Any
 from orchestrator.cores import usable_cores
 from orchestrator.errors import UsageError
 from orchestrator.interruption import own_handler_kept
-from orchestrator.jobs import BuildJob, Job, PlayJob, Report
-from orchestrator.store import Artifact
+from orchestrator.storage.store import Artifact
+from orchestrator.work.jobs import BuildJob, Job, PlayJob, Report
 
 # Read by Ray when it is imported and started.
 os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
@@ -30,7 +30,7 @@ from ray.exceptions import RayError  # noqa: E402
 
 @ray.remote(num_cpus=1, max_retries=0)
 def _build(job: BuildJob, roles: list[str], *artifacts: Artifact) -> Report:
-    from orchestrator.worker import build, use_one_thread
+    from orchestrator.work.worker import build, use_one_thread
 
     use_one_thread()
     return build(job, dict(zip(roles, artifacts, strict=True)))
@@ -41,8 +41,8 @@ class _Player:
     """A block player with the artifacts it has been shown so far."""
 
     def __init__(self) -> None:
-        from orchestrator.playing import BlockPlayer
-        from orchestrator.worker import use_one_thread
+        from orchestrator.work.playing import BlockPlayer
+        from orchestrator.work.worker import use_one_thread
 
         use_one_thread()
         self._player = BlockPlayer()

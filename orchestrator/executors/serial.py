@@ -6,10 +6,10 @@ from collections import deque
 
 from threadpoolctl import threadpool_limits
 
-from orchestrator.jobs import BuildJob, Job, Report
-from orchestrator.playing import BlockPlayer
-from orchestrator.store import Artifact
-from orchestrator.worker import build, use_one_thread
+from orchestrator.storage.store import Artifact
+from orchestrator.work.jobs import BuildJob, Job, Report
+from orchestrator.work.playing import BlockPlayer
+from orchestrator.work.worker import build, use_one_thread
 
 
 class SerialExecutor:

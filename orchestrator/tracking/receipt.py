@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal
 
-from orchestrator.store import write_atomically
+from orchestrator.storage.store import write_atomically
 
 Status = Literal["RUNNING", "FINISHED", "FAILED"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from analysis.writers import markdown_table, seed_note
-from orchestrator.spec import Spec
-from orchestrator.structure import Plain
+from orchestrator.spec.spec import Spec
+from orchestrator.spec.structure import Plain
 from sweeps.arena import Arena
 from sweeps.candidates import NO_STITCH
 from sweeps.questions.question import SHOWN, Metric, Question

@@ -17,9 +17,9 @@ from analysis.paper import paper_scores
 from analysis.profile import MARGIN, profile
 from analysis.writers import markdown_table
 from orchestrator.errors import UsageError
-from orchestrator.methods import method_label
-from orchestrator.spec import Spec
-from orchestrator.structure import Plain
+from orchestrator.spec.methods import method_label
+from orchestrator.spec.spec import Spec
+from orchestrator.spec.structure import Plain
 from sweeps.arena import Arena, Played
 from sweeps.questions.question import SHOWN, Metric, Question
 from sweeps.space import Fields, replaced

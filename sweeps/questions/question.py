@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
-from orchestrator.spec import Spec
-from orchestrator.structure import Plain
+from orchestrator.spec.spec import Spec
+from orchestrator.spec.structure import Plain
 from sweeps.arena import Arena
 from sweeps.space import Fields
 

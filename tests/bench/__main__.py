@@ -17,7 +17,7 @@ from typing import Annotated, Literal, get_args
 
 import tyro
 
-from orchestrator.worker import use_one_thread
+from orchestrator.work.worker import use_one_thread
 from tests.bench import (
     bench_iql,
     bench_planner,

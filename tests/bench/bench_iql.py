@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from orchestrator.spec import load_spec
+from orchestrator.spec.spec import load_spec
 from stitching.data.experience import Experience
 from stitching.data.transitions import Transitions
 from stitching.envs.maze import MAZE

@@ -37,10 +37,10 @@ import torch
 from torch import Tensor
 
 from orchestrator.builders.models import load_models
-from orchestrator.rundir import RunDirectory
-from orchestrator.spec import Spec, load_spec
-from orchestrator.store import Arrays, Artifact, Store
-from orchestrator.structure import to_plain
+from orchestrator.spec.spec import Spec, load_spec
+from orchestrator.spec.structure import to_plain
+from orchestrator.storage.rundir import RunDirectory
+from orchestrator.storage.store import Arrays, Artifact, Store
 from stitching.data.transitions import Transitions, concatenate
 from stitching.envs.kitchen import KITCHEN
 from stitching.methods.mb_stitch import MBStitch, MBStitchSettings

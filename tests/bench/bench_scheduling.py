@@ -19,13 +19,13 @@ from time import perf_counter, process_time
 
 import numpy as np
 
-from orchestrator.evaluation import Evaluation
-from orchestrator.jobs import BlockReport, Job, PlayJob, Report
-from orchestrator.ledger import Ledger, Outcome
-from orchestrator.plan import Plan, make_plan
-from orchestrator.progress import Silent
-from orchestrator.spec import load_spec
-from orchestrator.store import Artifact, Store
+from orchestrator.spec.spec import load_spec
+from orchestrator.storage.ledger import Ledger, Outcome
+from orchestrator.storage.store import Artifact, Store
+from orchestrator.work.evaluation import Evaluation
+from orchestrator.work.jobs import BlockReport, Job, PlayJob, Report
+from orchestrator.work.plan import Plan, make_plan
+from orchestrator.work.progress import Silent
 from stitching.envs.maze import MAZE
 from tests.bench.result import Result
 

@@ -9,9 +9,9 @@ import pytest
 from orchestrator.benchmarks.registry import KITS
 from orchestrator.builders.registry import BUILDERS
 from orchestrator.errors import UsageError
-from orchestrator.plan import Plan, make_plan
-from orchestrator.rundir import describe
-from orchestrator.spec import Spec, load_spec
+from orchestrator.spec.spec import Spec, load_spec
+from orchestrator.storage.rundir import describe
+from orchestrator.work.plan import Plan, make_plan
 from stitching.data.kitchen.demonstrations import KitchenDataConfig
 from stitching.envs.kitchen import SKILLS
 

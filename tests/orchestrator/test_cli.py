@@ -16,12 +16,12 @@ import numpy as np
 import pytest
 
 from analysis.results import provenance_text
-from orchestrator import playing
 from orchestrator.cli import COMMANDS, main
 from orchestrator.errors import LockedError
-from orchestrator.plan import Plan
-from orchestrator.spec import Spec
-from orchestrator.store import Artifact
+from orchestrator.spec.spec import Spec
+from orchestrator.storage.store import Artifact
+from orchestrator.work import playing
+from orchestrator.work.plan import Plan
 from tests.orchestrator.tiny import TINY, Counted, Place, carry_out, promised_bytes, serially
 
 
@@ -199,7 +199,7 @@ def test_run_and_run_again(cli: Cli, place: Place, expected: dict[str, bytes]) -
 
     before = {path: path.stat().st_mtime_ns for path in (place.out / "report").iterdir()}
     started = time.monotonic()
-    with mock.patch("orchestrator.reproduce.open_executor", side_effect=AssertionError):
+    with mock.patch("orchestrator.work.reproduce.open_executor", side_effect=AssertionError):
         again = cli("run", *options(place))
     assert time.monotonic() - started < 5
     assert again.code == 0
@@ -264,7 +264,7 @@ def test_nondeterminism_is_6(cli: Cli, trained: Place, finished: Place, plan: Pl
             trained.shared().record([(key, theirs[1] + b" ")])
             return super().next()
 
-    with mock.patch("orchestrator.reproduce.open_executor", return_value=Other()):
+    with mock.patch("orchestrator.work.reproduce.open_executor", return_value=Other()):
         answer = cli("run", *options(trained))
     assert answer.code == 6
     assert f"block {key} was played before with other bytes" in answer.err
@@ -314,7 +314,7 @@ def test_a_disk_that_refuses_is_3(cli: Cli, place: Place) -> None:
 
 
 def test_an_interrupt_is_130(cli: Cli, trained: Place) -> None:
-    with mock.patch("orchestrator.playing.play_segment", side_effect=KeyboardInterrupt):
+    with mock.patch("orchestrator.work.playing.play_segment", side_effect=KeyboardInterrupt):
         answer = cli("run", *options(trained))
     assert answer.code == 130
     assert "the same command resumes" in answer.err
@@ -447,7 +447,7 @@ def test_gc(cli: Cli, done: Place, plan: Plan, expected: dict[str, bytes], spec:
     assert answer.out.count("deleted ") == len(before[0]) - len(artifacts) + 2
     assert wanted.is_dir()
     assert not unwanted.exists()
-    with mock.patch("orchestrator.reproduce.open_executor", side_effect=AssertionError):
+    with mock.patch("orchestrator.work.reproduce.open_executor", side_effect=AssertionError):
         assert cli("run", *options(done)).code == 0
     assert promised_bytes(done.out) == expected
     carry_out(changed, serially(other, done.store_root))  # what was deleted is made again
@@ -480,7 +480,7 @@ def test_gc_deletes_nothing_while_a_run_uses_the_store(cli: Cli, done: Place, sp
 
     before = set(done.store.artifacts())
     with (
-        mock.patch("orchestrator.playing.BlockPlayer.play", side_effect=play),
+        mock.patch("orchestrator.work.playing.BlockPlayer.play", side_effect=play),
         pytest.raises(KeyboardInterrupt),
     ):
         carry_out(changed, serially(other, done.store_root))

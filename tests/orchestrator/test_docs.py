@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from orchestrator.cli import COMMANDS
-from orchestrator.plan import make_plan
-from orchestrator.spec import load_spec
+from orchestrator.spec.spec import load_spec
+from orchestrator.work.plan import make_plan
 
 ROOT = Path(__file__).parents[2]
 

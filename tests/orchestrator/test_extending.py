@@ -12,9 +12,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from orchestrator.plan import make_plan
-from orchestrator.rundir import describe
-from orchestrator.spec import load_spec
+from orchestrator.spec.spec import load_spec
+from orchestrator.storage.rundir import describe
+from orchestrator.work.plan import make_plan
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "example"
 METHODS = ("no-stitch", "hold-stitch", "mb-stitch", "mb-stitch[planner=hold-shooting]")
@@ -25,8 +25,8 @@ RUN = (
 NAMES = f"""
 import json
 from dataclasses import replace
-from orchestrator.plan import make_plan
-from orchestrator.spec import load_spec
+from orchestrator.work.plan import make_plan
+from orchestrator.spec.spec import load_spec
 spec = load_spec("table1", "smoke")
 plan = make_plan(replace(spec, methods={METHODS}))
 names = {{node.method: task.key for (node, _), task in plan.tasks.items()}}
@@ -107,9 +107,9 @@ def test_what_is_not_used_leaves_no_trace(place: Path) -> None:
     """Neither in names nor in what a run directory keeps: it is read without the package."""
     code = """
 import json
-from orchestrator.plan import make_plan
-from orchestrator.rundir import describe
-from orchestrator.spec import load_spec
+from orchestrator.work.plan import make_plan
+from orchestrator.storage.rundir import describe
+from orchestrator.spec.spec import load_spec
 spec = load_spec("table1", "smoke")
 plan = make_plan(spec)
 keys = [task.key for task in plan.tasks.values()]

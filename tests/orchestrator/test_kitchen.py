@@ -8,10 +8,10 @@ from itertools import pairwise, permutations
 import pandas as pd
 import pytest
 
-from orchestrator.plan import Plan, make_plan
 from orchestrator.printing import forecast_lines
-from orchestrator.spec import Spec, load_spec
-from orchestrator.store import Store
+from orchestrator.spec.spec import Spec, load_spec
+from orchestrator.storage.store import Store
+from orchestrator.work.plan import Plan, make_plan
 from stitching.anatomy import START
 from stitching.data.kitchen.demonstrations import KitchenDataConfig
 from stitching.data.kitchen.segments import Order

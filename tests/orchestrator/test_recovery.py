@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from orchestrator.cli import TERMINATED
-from orchestrator.spec import Spec
+from orchestrator.spec.spec import Spec
 from tests.orchestrator.executors.processes import descendants, title, titled
 from tests.orchestrator.tiny import (
     TINY,

@@ -6,8 +6,8 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
-from orchestrator.plan import make_plan
-from orchestrator.spec import Spec, load_spec
+from orchestrator.spec.spec import Spec, load_spec
+from orchestrator.work.plan import make_plan
 from stitching.models.dynamics import DynamicsConfig
 from stitching.models.iql import IQLConfig
 from stitching.planning.cem import CEM

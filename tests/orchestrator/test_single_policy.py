@@ -7,10 +7,10 @@ import pytest
 from analysis.paper import paper_table
 from orchestrator.benchmarks.registry import KITS
 from orchestrator.errors import UsageError
-from orchestrator.plan import Plan, make_plan
-from orchestrator.rundir import describe
-from orchestrator.spec import Spec, load_spec
-from orchestrator.tomls import Scale
+from orchestrator.spec.spec import Spec, load_spec
+from orchestrator.spec.tomls import Scale
+from orchestrator.storage.rundir import describe
+from orchestrator.work.plan import Plan, make_plan
 
 METHOD = "single-policy"
 

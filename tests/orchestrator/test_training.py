@@ -9,8 +9,8 @@ import torch
 from orchestrator.builders.models import load_models
 from orchestrator.builders.parts import as_artifact
 from orchestrator.builders.registry import BUILDERS
-from orchestrator.store import Artifact
-from orchestrator.structure import to_plain
+from orchestrator.spec.structure import to_plain
+from orchestrator.storage.store import Artifact
 from stitching.data.maze import MazeDataConfig, skill_demonstrations
 from stitching.data.mixtures import Mixture, skill_pairs
 from stitching.data.transitions import Transitions

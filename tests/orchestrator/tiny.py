@@ -10,21 +10,21 @@ from unittest import mock
 from orchestrator.benchmarks.registry import BENCHMARKS
 from orchestrator.builders.models import load_models
 from orchestrator.executors.serial import SerialExecutor
-from orchestrator.jobs import BuildJob, Job
-from orchestrator.ledger import Ledger, Outcome
-from orchestrator.methods import (
+from orchestrator.spec.methods import (
     first_method,
     method_block,
     method_name,
     method_of,
     method_rollout,
 )
-from orchestrator.plan import Node, Plan
-from orchestrator.progress import Silent
-from orchestrator.reproduce import Settings, reproduce
-from orchestrator.rundir import RunDirectory
-from orchestrator.spec import Spec, load_spec
-from orchestrator.store import Store
+from orchestrator.spec.spec import Spec, load_spec
+from orchestrator.storage.ledger import Ledger, Outcome
+from orchestrator.storage.rundir import RunDirectory
+from orchestrator.storage.store import Store
+from orchestrator.work.jobs import BuildJob, Job
+from orchestrator.work.plan import Node, Plan
+from orchestrator.work.progress import Silent
+from orchestrator.work.reproduce import Settings, reproduce
 from stitching.models.agent import Agent
 from stitching.rollout import Play, Segments, play_from_start
 

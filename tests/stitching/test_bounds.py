@@ -9,7 +9,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 import pytest
 from annotated_types import Interval
 
-from orchestrator.spec import Spec
+from orchestrator.spec.spec import Spec
 from stitching.bounds import Amount, Bounded, Count, Inside, NotNegative, Share
 from stitching.methods.registry import METHODS
 from sweeps.spec import SweepSpec

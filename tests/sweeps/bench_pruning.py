@@ -8,10 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from orchestrator.progress import Silent
-from orchestrator.reproduce import LazyExecutor
-from orchestrator.rundir import RunDirectory
-from orchestrator.worker import use_one_thread
+from orchestrator.storage.rundir import RunDirectory
+from orchestrator.work.progress import Silent
+from orchestrator.work.reproduce import LazyExecutor
+from orchestrator.work.worker import use_one_thread
 from sweeps.arena import Arena
 from sweeps.confirm import confirm_spec
 from sweeps.scoring import play_candidates

@@ -12,12 +12,12 @@ import pandas as pd
 import pytest
 
 from analysis.results import extent_of, provenance_text
-from orchestrator import locking
 from orchestrator.cli import main
 from orchestrator.errors import LockedError, UsageError
-from orchestrator.progress import Silent
-from orchestrator.rundir import RunDirectory
-from orchestrator.spec import TableSpec
+from orchestrator.spec.spec import TableSpec
+from orchestrator.storage import locking
+from orchestrator.storage.rundir import RunDirectory
+from orchestrator.work.progress import Silent
 from sweeps import winner as winners
 from sweeps.candidates import method_of
 from sweeps.figures import draw_figures, paper_gains, pareto_front

@@ -13,9 +13,9 @@ from typing import Any
 import optuna
 import pytest
 
-from orchestrator import evaluation
 from orchestrator.errors import ChangedError, LockedError, StorageError
-from orchestrator.rundir import RunDirectory
+from orchestrator.storage.rundir import RunDirectory
+from orchestrator.work import evaluation
 from sweeps import study as studies
 from sweeps.spec import Pruner
 from sweeps.study import JOURNAL, SweepStudy, repair

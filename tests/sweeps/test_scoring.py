@@ -5,7 +5,7 @@ from typing import cast
 
 import pandas as pd
 
-from orchestrator.spec import load_spec
+from orchestrator.spec.spec import load_spec
 from stitching.methods.mb_stitch import MBStitchSettings
 from sweeps.scoring import Showing
 

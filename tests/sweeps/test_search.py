@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from orchestrator.errors import UsageError
-from orchestrator.spec import load_spec
+from orchestrator.spec.spec import load_spec
 from sweeps.candidates import group, method_of
 from sweeps.search import rounds, search_spec
 from sweeps.space import Dimension
@@ -59,7 +59,7 @@ def test_a_search_keeps_its_report(finished: Path) -> None:
 
 def test_every_block_is_played_once(trained: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     executor = Counted()
-    monkeypatch.setattr("orchestrator.reproduce.open_executor", lambda *_: executor)
+    monkeypatch.setattr("orchestrator.work.reproduce.open_executor", lambda *_: executor)
     sweep_in(trained, tiny_sweep())
     assert set(executor.played.values()) == {1}
     assert not executor.built

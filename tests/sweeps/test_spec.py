@@ -9,9 +9,9 @@ from analysis.paper import paper_scores
 from analysis.rows import place_tasks
 from analysis.run import RunSpec
 from orchestrator.errors import UsageError
-from orchestrator.rundir import describe
-from orchestrator.spec import TableSpec, load_spec
-from orchestrator.tomls import Scale
+from orchestrator.spec.spec import TableSpec, load_spec
+from orchestrator.spec.tomls import Scale
+from orchestrator.storage.rundir import describe
 from sweeps.space import Dimension, replaced
 from sweeps.spec import (
     Confirm,

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-from orchestrator.progress import Silent
-from orchestrator.reproduce import Settings
-from orchestrator.rundir import RunDirectory
+from orchestrator.storage.rundir import RunDirectory
+from orchestrator.work.progress import Silent
+from orchestrator.work.reproduce import Settings
 from sweeps.spec import SweepSpec, load_sweep
 from sweeps.study import SweepStudy
 from sweeps.sweep import carry_out

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.spec import load_spec
+from orchestrator.spec.spec import load_spec
 from tests.orchestrator.executors import two_nodes
 from tests.orchestrator.tiny import Place, blocks_played, promised_bytes
 

@@ -8,11 +8,11 @@ import pytest
 
 from orchestrator.executors import ExecutorKind, open_executor
 from orchestrator.executors.protocol import Executor
-from orchestrator.jobs import BlockTask, BuildJob, Job, PlayJob, Report
-from orchestrator.ledger import Outcome
-from orchestrator.plan import Plan
-from orchestrator.recipes import Recipe
-from orchestrator.store import Artifact
+from orchestrator.storage.ledger import Outcome
+from orchestrator.storage.store import Artifact
+from orchestrator.work.jobs import BlockTask, BuildJob, Job, PlayJob, Report
+from orchestrator.work.plan import Plan
+from orchestrator.work.recipes import Recipe
 from tests.orchestrator.tiny import Place
 
 KINDS = ["serial", pytest.param("ray", marks=pytest.mark.ray)]

@@ -14,8 +14,8 @@ from orchestrator.errors import UsageError
 from orchestrator.executors import open_executor
 from orchestrator.executors import ray as ray_executor
 from orchestrator.executors.protocol import Executor
-from orchestrator.jobs import BlockTask, BuildJob, Job, PlayJob, Report
-from orchestrator.plan import Plan
+from orchestrator.work.jobs import BlockTask, BuildJob, Job, PlayJob, Report
+from orchestrator.work.plan import Plan
 from tests.orchestrator.executors.processes import titled
 from tests.orchestrator.tiny import Place
 

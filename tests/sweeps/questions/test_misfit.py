@@ -13,11 +13,11 @@ from analysis.episodes import episodes_from_segments
 from analysis.implied import bounds
 from analysis.run import RunSpec
 from orchestrator.errors import UsageError
-from orchestrator.methods import first_method
-from orchestrator.plan import make_plan
-from orchestrator.progress import Silent
-from orchestrator.rundir import describe
-from orchestrator.spec import Spec, load_spec
+from orchestrator.spec.methods import first_method
+from orchestrator.spec.spec import Spec, load_spec
+from orchestrator.storage.rundir import describe
+from orchestrator.work.plan import make_plan
+from orchestrator.work.progress import Silent
 from stitching.data.kitchen.demonstrations import KitchenDataConfig
 from sweeps.arena import Arena, Played
 from sweeps.costs import plan_lines

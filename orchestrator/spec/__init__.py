@@ -1,0 +1,1 @@
+"""What is asked: specs and suites, read from files and checked."""

@@ -1,0 +1,70 @@
+"""What a folder holds: every run and sweep in it, a line each."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+
+from orchestrator.errors import UsageError
+from orchestrator.spec.structure import Plain
+from orchestrator.storage.rundir import RunDirectory
+
+STORE = "blocks.sqlite"
+
+
+def listing_lines(root: Path) -> Iterator[str]:
+    """Each run, suite and sweep below `root`: where, what, how far, and when it last went on.
+
+    Raises UsageError where there is no such folder.
+    """
+    if not root.is_dir():
+        raise UsageError(f"{root} is no folder; name the one that your runs are in")
+    rows = [_row(folder) for folder in sorted(_run_folders(root))]
+    if not rows:
+        yield f"no run in {root}"
+        return
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        yield "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+
+
+def _run_folders(root: Path) -> Iterator[Path]:
+    """Parts of a suite and the table of a sweep belong to it; what a store holds is no run."""
+    for folder, below, files in os.walk(root):
+        if "spec.json" in files:
+            yield Path(folder)
+        if "spec.json" in files or STORE in files:
+            below.clear()
+
+
+def _row(folder: Path) -> tuple[str, str, str, str]:
+    directory = RunDirectory(folder)
+    try:
+        sweep = directory.asked_sweep()
+        asked = sweep or directory.asked()
+        what = f"{asked['name']} at {asked['scale']} scale"
+        state = _progress(directory, sweep) if sweep else _state(directory)
+    except (ValueError, KeyError):
+        what, state = "unreadable", "its spec.json is damaged, or of another version"
+    newest = max(path.stat().st_mtime for path in folder.iterdir())
+    when = datetime.fromtimestamp(newest, UTC).strftime("%Y-%m-%d %H:%M UTC")
+    return str(folder), what, state, when
+
+
+def _progress(directory: RunDirectory, sweep: Plain) -> str:
+    return f"{len(directory.read_json('trials.json') or [])} of {sweep['trials']} trials"
+
+
+def _state(directory: RunDirectory) -> str:
+    if directory.played:
+        return "finished"
+    if given_up := directory.read_json("quarantine.json"):
+        return f"{len(given_up)} blocks given up"
+    if not (directory.path / "ledger.sqlite").is_file():
+        return "unfinished"
+    ledger = directory.ledger(read_only=True)
+    blocks = len(ledger.finished())
+    ledger.close()
+    return f"unfinished, {blocks:,} blocks played"

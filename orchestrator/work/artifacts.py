@@ -1,0 +1,206 @@
+"""The recipes of what a spec needs: its datasets, its models, and what is only looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import chain, pairwise
+from typing import TypeVar
+
+from orchestrator.benchmarks.kit import TEACHING, Dataset, Illustration
+from orchestrator.benchmarks.registry import BENCHMARKS, KITS
+from orchestrator.spec.methods import SHARED, method_of, playing_modules, settings_with_effect
+from orchestrator.spec.spec import Spec
+from orchestrator.spec.structure import Plain, to_plain
+from orchestrator.work.recipes import Recipe, code_fingerprint
+from stitching.methods.mb_stitch import MB_STITCH
+from stitching.methods.mf_stitch import MFStitchSettings
+from stitching.methods.no_stitch import NO_STITCH
+from stitching.methods.planning import PlanningSettings
+from stitching.methods.protocol import Method, MethodSettings
+from stitching.methods.single_policy import SinglePolicySettings
+
+S = TypeVar("S", bound=MethodSettings)
+
+
+@dataclass
+class Recipes:
+    """By key, in an order in which they can be made."""
+
+    spec: Spec
+    by_key: dict[str, Recipe] = field(default_factory=dict)
+    datasets: dict[str, str] = field(default_factory=dict)  # role → key; dynamics learn from all
+    long_horizon: dict[str, str] = field(default_factory=dict)  # likewise, of Single-Policies
+    models: dict[tuple[str, int, str], str] = field(default_factory=dict)  # see `Plan.models`
+    illustrations: dict[str, str] = field(default_factory=dict)  # name → key
+
+    def add(self, kind: str, params: Plain, inputs: dict[str, str] | None = None) -> str:
+        """Key of the recipe; the same one twice is one."""
+        recipe = Recipe(kind, {"benchmark": self.spec.benchmark, **params}, inputs or {})
+        self.by_key[recipe.key] = recipe
+        return recipe.key
+
+    def add_datasets(self) -> None:
+        """What skills and dynamics are learned from, where any method needs skills."""
+        if not any(method_of(method).told for method in self.spec.methods):
+            return
+        for role, one in self._kit_datasets.items():
+            params = {"config": self.data_settings, **self.root, **one.params}
+            self.datasets[role] = self.add(one.kind, params)
+
+    def add_models(self) -> None:
+        """What the spec's methods are played with, under every seed."""
+        shared = [SHARED] if any(method_of(method).told for method in self.spec.methods) else []
+        for kind, recipe_of in MODELS.items():
+            for seed in range(self.spec.seeds):
+                for method in (*self.spec.methods, *shared):
+                    if kind in method_of(method).models:
+                        self.models[kind, seed, method] = recipe_of(self, seed, method)
+
+    def add_illustrations(self) -> None:
+        """What is looked at of MB-Stitch, with seed 0's models; of several, the first one's."""
+        ours = _settings(self.spec, MB_STITCH)[:1]
+        if not ours:
+            return
+        kit, data = KITS[self.spec.benchmark], {"config": to_plain(self.spec.data)}
+        extras = {role: self.add(kind, data | self.root) for role, kind in kit.extras.items()}
+        models = {kind: self.models[kind, 0, ours[0][0]] for kind in MB_STITCH.models}
+        there = models | self.datasets | extras
+        for name, one in kit.illustrations.items():
+            roles = [self.demonstrations if role == TEACHING else (role,) for role in one.inputs]
+            inputs = {role: there[role] for role in chain.from_iterable(roles)}
+            self.illustrations[name] = self.add(one.kind, _illustrated(self.spec, one), inputs)
+
+    @property
+    def demonstrations(self) -> dict[str, str]:
+        """The datasets that skills are learned from: role → key."""
+        teaching = (role for role, one in self._kit_datasets.items() if one.teaches)
+        return {role: self.datasets[role] for role in teaching}
+
+    @cached_property
+    def data_settings(self) -> Plain:
+        """Settings of the data, but for those that nothing learned from depends on."""
+        looked_at = KITS[self.spec.benchmark].for_extras
+        settings = to_plain(self.spec.data)
+        return {name: value for name, value in settings.items() if name not in looked_at}
+
+    @cached_property
+    def _kit_datasets(self) -> dict[str, Dataset]:
+        return KITS[self.spec.benchmark].datasets(self.spec.data)
+
+    def settings(self, method: str, expected: type[S]) -> S:
+        """Of a method that asks for a model. Raises TypeError where they do not say how it is."""
+        settings = self.spec.method_settings(method)
+        if not isinstance(settings, expected):
+            raise TypeError(f"{method}: has no {expected.__name__}, which its models need")
+        return settings
+
+    @property
+    def root(self) -> dict[str, int]:
+        return {"root_seed": self.spec.root_seed}
+
+    @property
+    def factors(self) -> Plain:
+        """Which numbers of an observation belong together."""
+        plain: Plain = to_plain(BENCHMARKS[self.spec.benchmark].factors)
+        return plain
+
+
+def _agent(recipes: Recipes, seed: int, method: str) -> str:
+    learner = {"config": to_plain(recipes.spec.agent)}
+    if recipes.spec.agent.alters:
+        learner["factors"] = recipes.factors
+    return recipes.add("agent", {**learner, **recipes.root, "seed": seed}, recipes.demonstrations)
+
+
+def _initiation_sets(recipes: Recipes, seed: int, method: str) -> str:
+    """The same for all seeds: they are of the data alone."""
+    return recipes.add("initiation-sets", {"factors": recipes.factors}, recipes.demonstrations)
+
+
+def _dynamics(recipes: Recipes, seed: int, method: str) -> str:
+    params = {"config": to_plain(recipes.spec.dynamics), "seed": seed, **recipes.root}
+    return recipes.add("dynamics", params, recipes.datasets)
+
+
+def _mf_policy(recipes: Recipes, seed: int, method: str) -> str:
+    settings = recipes.settings(method, MFStitchSettings)
+    params = {"config": to_plain(settings.training), "seed": seed, **recipes.root}
+    fine_tuned = settings.mixture == "fine-tuned"
+    start = {"agent": recipes.models["agent", seed, method]} if fine_tuned else {}
+    inputs = recipes.demonstrations | start
+    return recipes.add("mf-policy", params | {"mixture": settings.mixture}, inputs)
+
+
+def _single_policy(recipes: Recipes, seed: int, method: str) -> str:
+    settings = recipes.settings(method, SinglePolicySettings)
+    kind = KITS[recipes.spec.benchmark].long_horizon(recipes.spec.data)
+    shown = {"config": recipes.data_settings | {"episodes": settings.episodes}, **recipes.root}
+    key = recipes.add(kind, shown | {"order": settings.order})
+    recipes.long_horizon[f"demonstrations of {method}"] = key
+    params = {"config": to_plain(settings.training), "seed": seed, **recipes.root}
+    return recipes.add("single-policy", params, {"long-horizon": key})
+
+
+MODELS: dict[str, Callable[[Recipes, int, str], str]] = {
+    "agent": _agent,
+    "initiation-sets": _initiation_sets,
+    "dynamics": _dynamics,
+    "mf-policy": _mf_policy,
+    "single-policy": _single_policy,
+}
+"""How the recipe of a kind of model is made, for a seed and the method that asks for it."""
+
+
+def _illustrated(spec: Spec, illustration: Illustration) -> Plain:
+    """Parameters of an illustration; one that plays a task does so by No- and MB-Stitch.
+
+    Of several MB-Stitches, the first. One that takes stitches apart knows what No-Stitch is.
+    """
+    params: Plain = {
+        "rollout": to_plain(spec.rollout),
+        "step_limit": spec.step_limit,
+        "root_seed": spec.root_seed,
+        "seed": 0,
+    }
+    ours = _settings(spec, MB_STITCH)[:1]
+    planner = spec.method_settings(ours[0][0])
+    assert isinstance(planner, PlanningSettings)
+    modules = tuple(sorted(playing_modules(ours[0][0], planner)))
+    params["code"] = code_fingerprint(modules)  # of the planner, too
+    if illustration.pairs:
+        return params | {
+            "methods": ours,
+            "pairs": _spread_out(_neighbours(spec), illustration.pairs),
+            "episodes": min(illustration.episodes, spec.episodes),
+        }
+    task = illustration.task
+    if not task:
+        return params | {"horizon": planner.chosen.horizon}
+    return params | {
+        # Whatever their order in the spec.
+        "methods": _settings(spec, NO_STITCH) + ours,
+        "task": task if task in spec.all_tasks else max(spec.all_tasks, key=len),
+    }
+
+
+def _settings(spec: Spec, kind: Method) -> list[tuple[str, Plain]]:
+    """The spec's methods of a kind, each with its settings."""
+    return [
+        (method, settings_with_effect(spec.method_settings(method)))
+        for method in spec.methods
+        if method_of(method) is kind
+    ]
+
+
+def _neighbours(spec: Spec) -> list[tuple[str, ...]]:
+    """Skills that follow one another in some task, each pair once."""
+    return list(dict.fromkeys(pair for task in spec.all_tasks for pair in pairwise(task)))
+
+
+def _spread_out(pairs: list[tuple[str, ...]], most: int) -> list[tuple[str, ...]]:
+    """At most so many, at equal distances, with the first and the last."""
+    if len(pairs) <= most:
+        return pairs
+    return [pairs[round(i * (len(pairs) - 1) / max(1, most - 1))] for i in range(most)]

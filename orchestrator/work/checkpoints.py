@@ -1,0 +1,100 @@
+"""Where trainings of one artifact leave their checkpoints: a folder, and a file for each training.
+
+Apart from the trainings themselves: an edit here changes no model.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import time
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from safetensors import SafetensorError
+from safetensors.torch import load, save
+from torch import Tensor
+
+from orchestrator.errors import StorageError
+from orchestrator.storage.store import write_atomically
+from stitching.models.checkpoints import Checkpoint
+from stitching.streams import Label
+
+FORMAT = 1
+"""Of the files: those of another one count as none."""
+
+PLAIN = "plain"
+"""The tensor whose bytes are JSON: all that is no tensor."""
+
+
+@dataclass
+class Checkpoints:
+    """The folder must belong to one artifact: trainings in it are told apart by their labels alone.
+
+    It is made when it is needed; the folder around it must be there.
+    """
+
+    folder: Path | None  # None: nowhere
+    earlier: float = 0.0  # seconds that went into what was found, before this attempt
+    _started: float = field(default_factory=time.perf_counter)
+
+    def of(self, labels: tuple[Label, ...]) -> Checkpoint | None:
+        """The checkpoint of a training; None where there is no folder that can be seen from here.
+
+        Workers of other versions of torch and numpy, or with other instructions, go on with their
+        own: they round otherwise.
+        """
+        # Path.is_dir raises on EACCES.
+        if self.folder is None or not os.path.isdir(self.folder.parent):
+            return None
+        where = [FORMAT, torch.__version__, np.__version__, torch.backends.cpu.get_cpu_capability()]
+        told_apart = json.dumps([*where, *labels], default=int)
+        name = hashlib.blake2b(told_apart.encode(), digest_size=16).hexdigest()
+        return CheckpointFile(self.folder / name, self)
+
+    @property
+    def spent(self) -> float:
+        """Seconds of this attempt and of those whose checkpoints it went on from."""
+        return self.earlier + time.perf_counter() - self._started
+
+
+@dataclass(frozen=True)
+class CheckpointFile:
+    """A digest, then tensors and what is plain."""
+
+    path: Path
+    build: Checkpoints  # whose it is
+
+    def write(self, tensors: dict[str, Tensor], plain: dict[str, Any]) -> None:
+        """Replace the file whole; a disk that refuses costs the checkpoint alone."""
+        kept = {"plain": plain, "seconds": self.build.spent}
+        text = np.frombuffer(json.dumps(kept, default=np.ndarray.tolist).encode(), dtype=np.uint8)
+        whole = {name: tensor.detach().contiguous() for name, tensor in tensors.items()}
+        data = save(whole | {PLAIN: torch.from_numpy(text.copy())})
+        with suppress(OSError, StorageError):
+            write_atomically(self.path, _digest(data) + data)
+
+    def read(self) -> tuple[dict[str, Tensor], dict[str, Any]] | None:
+        try:
+            content = self.path.read_bytes()
+        except OSError:
+            return None
+        digest, data = content[:32], content[32:]
+        if digest != _digest(data):
+            return None
+        try:
+            tensors = load(data)
+            kept = json.loads(tensors.pop(PLAIN).numpy().tobytes())
+        except (SafetensorError, KeyError, ValueError):
+            return None
+        self.build.earlier = max(self.build.earlier, kept["seconds"])
+        return tensors, kept["plain"]
+
+
+def _digest(data: bytes) -> bytes:
+    return hashlib.sha256(data).digest()

@@ -1,0 +1,202 @@
+"""What a plan will cost before anything runs: found or missing, episodes, steps, time, disk."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from orchestrator.benchmarks.registry import KITS
+from orchestrator.spec.methods import method_rollout
+from orchestrator.spec.spec import Spec
+from orchestrator.storage.ledger import Ledger, Played
+from orchestrator.storage.store import CorruptArtifactError, Store
+from orchestrator.work.jobs import BlockTask
+from orchestrator.work.plan import Node, Plan
+from orchestrator.work.recipes import Recipe
+from stitching.methods.planning import PlanningSettings
+
+OTHER_SECONDS = 1.0  # of what nobody measured, such as data of the maze
+
+Standing = Literal["found", "decided", "missing"]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What is there, what is missing, and what the missing will take at most."""
+
+    artifacts: dict[str, tuple[int, int]]  # kind → found, missing
+    blocks: dict[str, dict[Standing, int]]  # method ("": first skills that are shared) → counts
+    episodes: int  # of the finished tables: tasks × methods × seeds × episodes
+    segments_missing: int  # expected
+    segments_in_tree: int
+    segments_naive: int
+    steps_in_tree: int  # environment steps if no episode ended early
+    steps_naive: int
+    seconds_training: float  # of one core
+    seconds_evaluation: float
+    disk_bytes: int
+    from_history: bool  # times measured on this store, not the reference
+
+
+def estimate(plan: Plan, store: Store, shared: Ledger) -> Estimate:
+    """Look at store and ledger; runs nothing.
+
+    How many episodes will survive to each block is what blocks like it have shown in this store;
+    where there were none, as many as usual in that benchmark.
+    """
+    spec = plan.spec
+    artifacts: dict[str, Counter[bool]] = {}
+    training = 0.0
+    trained = _training_history(store)
+    for key, recipe in plan.recipes.items():
+        found = (recipe.kind, key) in store
+        artifacts.setdefault(recipe.kind, Counter())[found] += 1
+        if not found:
+            known = trained.get(_size_class(recipe))
+            training += _reference_seconds(recipe) if known is None else known
+
+    history = shared.history()
+    blocks: dict[str, Counter[Standing]] = {}
+    evaluation = missing_segments = 0.0
+    for place in standings(plan, shared, history):
+        blocks.setdefault(place.node.method, Counter())[place.standing] += 1
+        if place.standing == "missing":
+            missing_segments += place.arriving
+            evaluation += place.arriving * seconds_each(place.task, history)
+
+    runs = len(spec.methods) * spec.seeds * spec.episodes
+    naive_segments = sum(len(task) for task in spec.all_tasks) * runs
+    naive_steps = sum(
+        min(spec.step_limits[len(task)], len(task) * _skill_limit(spec, method))
+        for method in spec.methods
+        for task in spec.all_tasks
+    )
+    return Estimate(
+        artifacts={kind: (c[True], c[False]) for kind, c in artifacts.items()},
+        blocks={method: dict(counts) for method, counts in blocks.items()},
+        episodes=len(spec.all_tasks) * runs,
+        segments_in_tree=len(plan.nodes) * spec.episodes,
+        segments_naive=naive_segments,
+        steps_in_tree=_steps_in_tree(plan),
+        steps_naive=naive_steps * spec.seeds * spec.episodes,
+        seconds_training=training,
+        seconds_evaluation=evaluation,
+        segments_missing=round(missing_segments),
+        disk_bytes=round(2 * KITS[spec.benchmark].costs.segment_bytes * missing_segments),
+        from_history=any(task.kind in history for task in plan.tasks.values()),
+    )
+
+
+@dataclass(frozen=True)
+class Place:
+    """A block of the tree, and what is known of it."""
+
+    node: Node
+    task: BlockTask
+    standing: Standing
+    arriving: float  # episodes expected to play it
+
+
+def standings(plan: Plan, shared: Ledger, history: Mapping[str, Played]) -> Iterator[Place]:
+    """Every block of a plan, and whether it is there, not needed, or to be played.
+
+    A block is decided without being played where no episode survived a block above it. What lies
+    below a missing block counts as missing: it is, at most.
+    """
+    for chunk, (first, end) in enumerate(plan.chunks):
+        waiting: list[tuple[Node, Standing | None, float]]
+        waiting = [(root, None, end - first) for root in plan.roots()]
+        while waiting:
+            node, standing, arriving = waiting.pop()
+            task = plan.tasks[node, chunk]
+            below = standing
+            if standing is None:
+                outcome = next((outcome for _, outcome in shared.outcomes([task.key])), None)
+                standing = "missing" if outcome is None else "found"
+                below = "missing" if outcome is None else None if outcome.survivors else "decided"
+            yield Place(node, task, standing, arriving)
+            surviving = arriving * _success_rate(task, history)
+            if standing == "found" and outcome is not None:
+                surviving = outcome.survivors
+            waiting.extend((child, below, surviving) for child in plan.children.get(node, []))
+
+
+def _success_rate(task: BlockTask, history: Mapping[str, Played]) -> float:
+    known = history.get(task.kind)
+    return KITS[task.benchmark].costs.success if known is None else known.success_rate
+
+
+def seconds_each(task: BlockTask, history: Mapping[str, Played]) -> float:
+    """What a segment of a block is expected to take a worker."""
+    if task.kind in history:
+        return history[task.kind].seconds_each
+    costs = KITS[task.benchmark].costs
+    plans = isinstance(task.settings, PlanningSettings)
+    return costs.planned_segment if plans else costs.segment
+
+
+def _reference_seconds(recipe: Recipe) -> float:
+    costs, config = KITS[recipe.params["benchmark"]].costs, recipe.params.get("config", {})
+    if recipe.kind in costs.update:
+        return costs.update[recipe.kind] * float(config["updates"])
+    if recipe.kind in costs.demonstration:
+        return costs.demonstration[recipe.kind] * _demonstrations(recipe)
+    return costs.whole.get(recipe.kind, OTHER_SECONDS)
+
+
+def _demonstrations(recipe: Recipe) -> float:
+    """How many a dataset asks for; orders may have more or fewer by their first skill."""
+    config = recipe.params["config"]
+    if "held-out" in recipe.kind:
+        return float(config["held_out"])
+    first = recipe.params.get("order", [""])[0]
+    return config["episodes"] * float(config.get("first_weights", {}).get(first, 1.0))
+
+
+def _skill_limit(spec: Spec, method: str) -> int:
+    """Most steps of one skill of a method: its own limit, or the task's where it has none."""
+    return method_rollout(method, spec.rollout).skill_limit or spec.step_limit
+
+
+def _steps_in_tree(plan: Plan) -> int:
+    """Most steps the tree can take: a limit of a skill's at each node, or of a task's on each path.
+
+    A leaf's path shares its steps with its siblings'; counting a whole task's limit at every leaf,
+    and nothing above it, bounds the sum.
+    """
+    spec = plan.spec
+    by_limit: dict[int, list[Node]] = {}
+    for node in plan.nodes:
+        by_limit.setdefault(_skill_limit(spec, node.method), []).append(node)
+    return spec.episodes * sum(
+        min(sum(node not in plan.children for node in nodes) * spec.step_limit, len(nodes) * limit)
+        for limit, nodes in by_limit.items()
+    )
+
+
+def _training_history(store: Store) -> dict[tuple[str, str], float]:
+    """Seconds that artifacts of a kind and size took before on this machine's store.
+
+    The longest, which is what to expect where other work runs beside it.
+    """
+    seconds: dict[tuple[str, str], float] = {}
+    for kind, key in store.artifacts():
+        try:
+            made = store.manifest(kind, key)["made"]
+        except CorruptArtifactError:
+            continue
+        recipe = Recipe(made["kind"], made["params"], made["inputs"])
+        size = _size_class(recipe)
+        seconds[size] = max(made["seconds"], seconds.get(size, 0.0))
+    return seconds
+
+
+def _size_class(recipe: Recipe) -> tuple[str, str]:
+    config = recipe.params.get("config", {})
+    names = ("updates", "width", "members", "multi_task", "episodes", "held_out")
+    size = [config.get(name) for name in names]
+    if config.get("first_weights"):
+        size.append(_demonstrations(recipe))
+    return recipe.kind, str(size)

@@ -1,0 +1,276 @@
+"""One reproduction from beginning to end: plan, build, play, write, report, track."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from analysis.episodes import write_episodes
+from analysis.report import build_report
+from orchestrator import tracking
+from orchestrator.cores import usable_cores
+from orchestrator.errors import (
+    BadDataError,
+    IncompleteError,
+    LockedError,
+    SkillstitchError,
+    UsageError,
+)
+from orchestrator.executors import ExecutorKind, open_executor
+from orchestrator.executors.protocol import Executor
+from orchestrator.spec.spec import Spec
+from orchestrator.spec.structure import Plain
+from orchestrator.storage import locking
+from orchestrator.storage.exports import write_readable
+from orchestrator.storage.ledger import Ledger
+from orchestrator.storage.provenance import provenance
+from orchestrator.storage.rundir import RunDirectory
+from orchestrator.storage.store import USUAL_STORE, Artifact, Store, storage_errors
+from orchestrator.work.building import Builds, verified_artifacts
+from orchestrator.work.evaluation import Evaluation
+from orchestrator.work.jobs import Job, Report
+from orchestrator.work.plan import Plan, make_plan
+from orchestrator.work.progress import Progress
+from orchestrator.work.stopwatch import Stopwatch
+
+NO_TRACKING = "none"
+MOST_ON_A_CORE = 8  # workers: each holds a copy of torch and of a simulator
+
+
+def check_workers(workers: int | None) -> None:
+    """Raise UsageError for a number that nothing could have."""
+    if workers is not None and workers < 1:
+        raise UsageError(f"--workers must be at least 1: {workers}")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Where and how a run is carried out; nothing here may change its results."""
+
+    out: Path
+    store: Path = USUAL_STORE
+    executor: ExecutorKind = "ray"
+    workers: int | None = None  # all cores, or all of the cluster's
+    address: str | None = None  # of a Ray cluster
+    tracking_uri: str | None = None  # SQLite beside the store; "none" turns tracking off
+
+    def __post_init__(self) -> None:
+        check_workers(self.workers)
+        if self.workers is None or self.address is not None:
+            return
+        cores = usable_cores()
+        if self.workers > MOST_ON_A_CORE * cores:
+            raise UsageError(
+                f"--workers {self.workers}: at most {MOST_ON_A_CORE * cores} on this machine's "
+                f"{cores} cores; for more, give the --address of a Ray cluster"
+            )
+
+    def resolved_tracking_uri(self) -> str:
+        return self.tracking_uri or tracking.default_uri(self.store.parent)
+
+
+@dataclass
+class LazyExecutor:
+    """Opens the real executor at the first job: a run that finds everything never starts Ray."""
+
+    settings: Settings
+    opened: Executor | None = field(default=None)
+
+    def open(self) -> Executor:
+        if self.opened is None:
+            settings = self.settings
+            self.opened = open_executor(settings.executor, settings.workers, settings.address)
+        return self.opened
+
+    @property
+    def workers(self) -> int:
+        return self.open().workers
+
+    def provide(self, key: str, artifact: Artifact) -> None:
+        self.open().provide(key, artifact)
+
+    def submit(self, job: Job) -> None:
+        self.open().submit(job)
+
+    def next(self) -> Report:
+        return self.open().next()
+
+    def close(self) -> None:
+        if self.opened is not None:
+            self.opened.close()
+
+
+def reproduce(spec: Spec, settings: Settings, progress: Progress) -> RunDirectory:
+    """Carry a spec out, or go on where an earlier run of it ended; returns its directory.
+
+    Raises LockedError, ChangedError, BadDataError, StorageError; IncompleteError when blocks had
+    to be given up (everything else is then finished and reported as partial).
+    """
+    directory, watch = RunDirectory(settings.out), Stopwatch()
+    with directory.locked(), locking.shared(settings.store, progress.say):
+        run_id = directory.settle(spec)
+        directory.uses(settings.store)
+        with tracked(directory, settings, progress, watch):
+            worked = _carry_out(spec, settings, directory, run_id, progress, watch)
+        if worked:
+            directory.write_json("seconds.json", watch.rounded())
+        if given_up := directory.read_json("quarantine.json"):
+            raise partial_error(f"{len(given_up)} blocks", directory)
+    return directory
+
+
+@contextmanager
+def tracked(
+    directory: RunDirectory, settings: Settings, progress: Progress, watch: Stopwatch
+) -> Iterator[None]:
+    """MLflow is told how the work ended; where it cannot be, that is said and fails nothing."""
+    uri = settings.resolved_tracking_uri()
+    try:
+        yield
+    except SkillstitchError:
+        publish(directory, uri, failed=True)
+        raise
+    if trouble := publish(directory, uri, finished=True):
+        progress.say(f"tracking: {trouble}")
+    watch.lap("tracking")
+
+
+def partial_error(blocks: str, directory: RunDirectory) -> IncompleteError:
+    """What to raise of a directory that is finished but for blocks that were given up."""
+    return IncompleteError(
+        f"{blocks} were given up after repeated failures (see "
+        f"{directory.path / 'quarantine.json'}); the tables are marked as partial, and the "
+        "same command tries again"
+    )
+
+
+def _carry_out(
+    spec: Spec,
+    settings: Settings,
+    directory: RunDirectory,
+    run_id: str,
+    progress: Progress,
+    watch: Stopwatch,
+) -> bool:
+    """Build and play whatever is missing, and write it up; False where nothing was missing."""
+    plan = make_plan(spec)
+    store, ledger = Store(settings.store), directory.ledger()
+    present = verified_artifacts(plan, store, ledger, progress)
+    if directory.played and present >= plan.needed:
+        if directory.finished:
+            return False
+    else:
+        directory.mark(finished=False)
+        facts: Plain = {"run_id": run_id}
+        directory.write_json("provenance.json", provenance() | facts)
+        facts |= _work(plan, settings, directory, store, ledger, present, progress, watch)
+        with storage_errors(directory.path):
+            counts = write_readable(plan, store, ledger, directory)
+            episodes = write_episodes(directory.path)
+            counts["episodes"] = len(episodes)
+            counts["environment steps without the tree"] = int(episodes["steps"].sum())
+            watch.lap("writing")
+            facts |= {"seconds": watch.rounded(), "counts": counts}
+            directory.write_json("provenance.json", provenance() | facts)
+    with storage_errors(directory.path):
+        build_report(directory.path)
+    directory.mark(finished=True)
+    watch.lap("report")
+    return True
+
+
+def _work(
+    plan: Plan,
+    settings: Settings,
+    directory: RunDirectory,
+    store: Store,
+    ledger: Ledger,
+    present: set[str],
+    progress: Progress,
+    watch: Stopwatch,
+) -> Plain:
+    """Train and simulate; returns what the provenance tells of it."""
+    shared = Ledger(settings.store / "blocks.sqlite")
+    executor = LazyExecutor(settings)
+    watch.lap("preparing")
+    announcement = None
+    try:
+        if not present >= plan.needed:
+            executor.open()
+        watch.lap("starting workers")
+        announcement = _announce(directory, settings.resolved_tracking_uri())
+        builds = Builds(plan, store, ledger, executor, progress)
+        busy_training = builds.run(plan.needed, present)
+        watch.lap("training")
+        evaluation = Evaluation(plan, store, ledger, shared, executor, progress)
+        evaluation.run()
+        watch.lap("evaluation")
+        _illustrate(builds, plan, present, progress)
+        watch.lap("illustrations")
+    finally:
+        executor.close()
+        if announcement is not None:
+            announcement.join()
+    watch.lap("stopping workers")
+    return {
+        "executor": settings.executor,
+        "workers": executor.opened.workers if executor.opened else 0,
+        "busy worker seconds": {
+            "training": round(busy_training, 1),
+            "evaluation": round(evaluation.seconds, 1),
+        },
+    }
+
+
+def _illustrate(builds: Builds, plan: Plan, present: set[str], progress: Progress) -> None:
+    """Last, and failing only costs a figure: it must not stand in the way of a number."""
+    missing = set(plan.recipes) - plan.needed - present
+    if not missing:
+        return
+    try:
+        builds.run(missing, present | plan.needed, phase="illustrations")
+    except (BadDataError, IncompleteError) as error:
+        progress.say(f"figures will be missing: {error}")
+
+
+def _announce(directory: RunDirectory, uri: str) -> threading.Thread:
+    """Show the run in MLflow as running, beside the work: importing MLflow alone takes seconds.
+
+    Its outcome does not matter: whatever is missed now, the last publication brings.
+    """
+    thread = threading.Thread(target=publish, args=(directory, uri), daemon=True)
+    thread.start()
+    return thread
+
+
+def publish(
+    directory: RunDirectory, uri: str, *, finished: bool = False, failed: bool = False
+) -> str:
+    """Bring MLflow's view of a run up to date; returns what went wrong, "" if nothing did."""
+    if uri == NO_TRACKING:
+        return ""
+    outcome = tracking.publish(directory.path, uri, finished=finished, failed=failed)
+    return "" if outcome.ok else f"{outcome.error}; the next command publishes what was missed"
+
+
+def catch_up(directory: RunDirectory) -> str:
+    """Publish what an earlier command could not; cheap where nothing was missed.
+
+    A run under way is left to its own process.
+    """
+    receipt = directory.read_json("tracking.json")
+    if receipt is None:
+        return ""
+    try:
+        with directory.locked():
+            return publish(
+                directory,
+                receipt["uri"],
+                finished=directory.played,
+                failed=receipt["status"] == "FAILED" and not directory.played,
+            )
+    except LockedError:
+        return ""

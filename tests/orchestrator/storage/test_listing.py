@@ -1,0 +1,56 @@
+"""`skillstitch list`, and `--version`."""
+
+import importlib.metadata
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from orchestrator.cli import main
+from orchestrator.errors import UsageError
+from orchestrator.storage.listing import listing_lines
+from tests.orchestrator.tiny import Place
+
+
+def test_every_run_has_a_line(finished: Place, tmp_path: Path) -> None:
+    runs = tmp_path / "runs"
+    shutil.copytree(finished.out, runs / "whole")
+    shutil.copytree(finished.out, runs / "deep" / "stopped")
+    (runs / "deep" / "stopped" / "finished").unlink()
+    shutil.copytree(finished.out, runs / "whole" / "parts" / "a")
+    (runs / "damaged").mkdir()
+    (runs / "damaged" / "spec.json").write_text("{")
+    shutil.copytree(finished.out, runs / "store" / "agent" / "key")
+    (runs / "store" / "blocks.sqlite").touch()
+    damaged, stopped, whole = listing_lines(runs)
+    assert "unreadable" in damaged
+    assert stopped.startswith(str(runs / "deep" / "stopped"))
+    assert "tiny at paper scale" in stopped
+    assert " blocks played" in stopped
+    assert whole.split()[-4] == "finished"
+    assert whole.endswith("UTC")
+
+
+def test_a_sweep_is_told_by_its_trials(finished: Place, tmp_path: Path) -> None:
+    shutil.copytree(finished.out, tmp_path / "sweep")
+    asked = {"name": "search", "scale": "quick", "trials": 5}
+    (tmp_path / "sweep" / "sweep.json").write_text(json.dumps(asked))
+    (tmp_path / "sweep" / "trials.json").write_text(json.dumps([{}, {}]))
+    (line,) = listing_lines(tmp_path)
+    assert "search at quick scale" in line
+    assert "2 of 5 trials" in line
+
+
+def test_a_folder_without_a_run(tmp_path: Path) -> None:
+    assert list(listing_lines(tmp_path)) == [f"no run in {tmp_path}"]
+    with pytest.raises(UsageError, match="is no folder"):
+        list(listing_lines(tmp_path / "nowhere"))
+
+
+def test_what_a_user_sees(finished: Place, capsys: pytest.CaptureFixture[str]) -> None:
+    main(["list", str(finished.out.parent)])
+    assert "finished" in capsys.readouterr().out
+    main(["--version"])
+    expected = f"skillstitch {importlib.metadata.version('skillstitch')}\n"
+    assert capsys.readouterr().out == expected

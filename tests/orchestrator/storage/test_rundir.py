@@ -1,0 +1,171 @@
+"""A run directory: one holder at a time, true to one spec, one version of the code."""
+
+import json
+import multiprocessing
+import os
+import re
+import signal
+import socket
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from orchestrator.errors import ChangedError, LockedError, StorageError, UsageError
+from orchestrator.spec.spec import Spec
+from orchestrator.storage.rundir import RunDirectory, default_out, describe
+from stitching.rollout import RolloutConfig
+from tests.orchestrator.tiny import Place
+
+
+@pytest.fixture
+def directory(tmp_path: Path) -> RunDirectory:
+    return RunDirectory(tmp_path / "run")
+
+
+def test_nobody_else_gets_in(directory: RunDirectory) -> None:
+    with directory.locked():
+        holder = f"process {os.getpid()} on {socket.gethostname()}"
+        message = f"{directory.path} is in use by {holder}; .*choose another --out"
+        with pytest.raises(LockedError, match=message) as caught, directory.locked():
+            pass
+        assert caught.value.exit_code == 4
+    with directory.locked():
+        pass
+
+
+def test_an_error_lets_go(directory: RunDirectory) -> None:
+    with pytest.raises(ZeroDivisionError), directory.locked():
+        _ = 1 / 0
+    with directory.locked():
+        pass
+
+
+def _hold(path: Path, held: Any) -> None:
+    with RunDirectory(path).locked():
+        held.set()
+        time.sleep(60)
+
+
+def test_a_kill_lets_go(directory: RunDirectory) -> None:
+    context = multiprocessing.get_context("fork")
+    held = context.Event()
+    holder = context.Process(target=_hold, args=(directory.path, held))
+    holder.start()
+    assert holder.pid is not None
+    assert held.wait(30)
+    started = time.monotonic()
+    with pytest.raises(LockedError, match=f"process {holder.pid} on"), directory.locked():
+        pass
+    assert time.monotonic() - started < 1  # at once
+    os.kill(holder.pid, signal.SIGKILL)
+    holder.join()
+    with directory.locked():
+        pass
+
+
+def test_a_second_launch_changes_nothing(spec: Spec, done: Place) -> None:
+    def content() -> dict[Path, bytes]:
+        return {path: path.read_bytes() for path in done.out.rglob("*") if path.is_file()}
+
+    with done.directory.locked():
+        before = content()
+        with pytest.raises(LockedError):
+            done.carry_out(replace(spec, seeds=1))
+        assert content() == before
+
+
+def test_a_place_that_cannot_be_a_directory(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    for path in (tmp_path / "file", tmp_path / "file" / "run"):
+        with (
+            pytest.raises(StorageError, match=rf"{path}.*choose another place"),
+            RunDirectory(path).locked(),
+        ):
+            pass
+
+
+def test_settling(directory: RunDirectory, spec: Spec) -> None:
+    run_id = directory.settle(spec)
+    assert directory.settle(spec) == run_id
+    assert directory.spec() == spec
+    assert RunDirectory(directory.path.with_name("other")).settle(spec) != run_id
+
+
+def test_a_kill_while_settling(directory: RunDirectory, spec: Spec) -> None:
+    """The spec is there, the identity is not: the directory was never used, anyone may have it."""
+    directory.settle(spec)
+    (directory.path / "identity.json").unlink()
+    other = replace(spec, seeds=1)
+    directory.settle(other)
+    assert directory.spec() == other
+
+
+def test_another_spec_is_refused_with_the_difference(done: Place, spec: Spec) -> None:
+    changed = replace(
+        spec, episodes=7, mb_stitch=replace(spec.mb_stitch, alpha=3.0), tasks=("g0>g1",)
+    )
+    with pytest.raises(ChangedError) as caught:
+        done.carry_out(changed)
+    assert caught.value.exit_code == 5
+    text = str(caught.value)
+    assert str(done.out) in text
+    assert "choose another --out" in text
+    assert "episodes: 6 → 7" in text
+    assert "mb_stitch.alpha: 10.0 → 3.0" in text
+    assert re.search(r"tasks: \[.*\] → \['g0>g1'\]", text)
+    assert "seeds" not in text
+    done.carry_out(spec)
+
+
+def test_another_version_is_refused_naming_it(done: Place, spec: Spec) -> None:
+    path = done.out / "identity.json"
+    identity = json.loads(path.read_text())
+    (code, fingerprint), *_ = [
+        item for item in identity["matters"].items() if item[0].startswith("code")
+    ]
+    now = dict(identity["matters"])
+    path.write_text(json.dumps(identity | {"matters": now | {"numpy": "1.0.0", code: "0" * 12}}))
+    with pytest.raises(ChangedError) as caught:
+        done.carry_out(spec)
+    assert caught.value.exit_code == 5
+    assert f"numpy: 1.0.0 → {now['numpy']}" in str(caught.value)
+    assert f"{code}: {'0' * 12} → {fingerprint}" in str(caught.value)
+    assert "torch" not in str(caught.value)
+
+
+def test_no_run_there(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=rf"{tmp_path} is no run directory"):
+        RunDirectory(tmp_path).spec()
+
+
+def test_what_a_reader_finds_in_the_spec(spec: Spec) -> None:
+    text = json.loads(json.dumps(describe(spec)))
+    assert text["skills"] == ["g0", "g1", "g2", "g3"]
+    assert text["tasks"] == list(spec.tasks)
+    assert text["seeds"] == [0, 1]
+    assert text["methods"][3] == {
+        "name": "mb-stitch", "label": "MB-Stitch", "own_first_skill": False
+    }  # fmt: skip
+    first = json.loads(
+        json.dumps(describe(replace(spec, rollout=RolloutConfig(first_stitch=True))))
+    )
+    assert [method["own_first_skill"] for method in first["methods"]] == [False, True, False, True]
+    assert text["step_limits"] == {"2": 20, "3": 30}
+
+
+def test_finished_means_with_nothing_given_up(directory: RunDirectory) -> None:
+    directory.mark(finished=True)
+    assert directory.finished
+    directory.write_json("quarantine.json", [{"seed": 0}])
+    assert not directory.finished
+    directory.write_json("quarantine.json", [])
+    directory.mark(finished=False)
+    directory.mark(finished=False)
+    assert not directory.finished
+
+
+def test_runs_are_kept_by_name_and_scale(spec: Spec) -> None:
+    assert default_out(spec) == Path("runs/tiny-paper")

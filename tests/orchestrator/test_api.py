@@ -1,0 +1,49 @@
+"""What Python sees: the promised names, and the examples that use them."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import orchestrator
+from orchestrator.errors import UsageError
+
+EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
+
+
+def test_the_promised_names_are_there() -> None:
+    assert all(callable(getattr(orchestrator, name)) for name in orchestrator.__all__)
+    assert orchestrator.__version__
+
+
+def test_a_suite_is_no_spec_and_a_spec_is_no_suite() -> None:
+    assert len(orchestrator.load_suite("table5", "smoke").parts) > 1
+    with pytest.raises(UsageError, match="a suite of several runs"):
+        orchestrator.load_spec("table5", "smoke")
+    with pytest.raises(UsageError, match="table1 is no suite"):
+        orchestrator.load_suite("table1", "smoke")
+
+
+def output(example: str, *words: object) -> str:
+    command = [sys.executable, str(EXAMPLES / example), *map(str, words)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return done.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.ray
+def test_the_examples_of_tables_run(tmp_path: Path) -> None:
+    table = output("reproduce_a_table.py", tmp_path)
+    assert "60 tasks" in table
+    assert "mb-stitch" in table
+    own = output("own_table.py", tmp_path)
+    assert "mb-stitch[alpha=20]" in own
+    assert "g2 → g0" in own
+
+
+def test_the_example_of_a_stitch_runs() -> None:
+    lines = output("one_stitch_by_hand.py").splitlines()
+    values = [float(line.split(" ± ")[0].split()[-1]) for line in lines]
+    assert len(values) == 6
+    assert values[-1] > values[0]
