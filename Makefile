@@ -3,9 +3,9 @@
 PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
-SOURCES := stitching orchestrator sweeps analysis tests
+SOURCES := stitching orchestrator sweeps analysis tests docs
 
-.PHONY: help setup reproduce test lint bench browser constraints
+.PHONY: help setup reproduce test lint bench wheel clean browser constraints
 
 help:  ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -32,6 +32,13 @@ lint: setup  ## style and types
 
 bench: setup  ## ratios that the documentation quotes, each within one run
 	$(BIN)/python -m tests.bench
+
+wheel: setup  ## a wheel in dist/
+	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .
+
+clean:  ## delete what builds and checks leave; runs/ and the environment stay
+	rm -rf build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -not -path './$(VENV)/*' -prune -exec rm -rf {} +
 
 # The report is tested in a real browser; Debian's is the one that needs no download of its own.
 browser:

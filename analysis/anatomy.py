@@ -66,6 +66,7 @@ def label(part: str, kind: str) -> str:
 
 
 def outcome(stitch: Stitch) -> str:
+    """What a stitch changed: it helped, hurt, or made no difference."""
     return OUTCOMES[stitch["succeeds_without"], stitch["succeeds_with"]]
 
 

@@ -35,6 +35,7 @@ def shared_note(spec: RunSpec) -> str:
 
 
 def profile_markdown(profile: pd.DataFrame, spec: RunSpec) -> str:
+    """First and second skills beside what Table 8 implies for them, as Markdown."""
     notes = [f"{note}\n" for note in (NOTE, shared_note(spec)) if note]
     lines = [f"# {TITLE}", "", *notes]
     for kind, heading in HEADINGS.items():

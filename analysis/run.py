@@ -180,10 +180,12 @@ def _table_entry(entry: Mapping[str, Any]) -> TableEntry:
 
 
 def plain_label(skill: str) -> str:
+    """A skill's name as people write it: "bottom-burner" → "bottom burner"."""
     return skill.replace("_", " ").replace("-", " ")
 
 
 def task_length(task: str) -> int:
+    """How many skills a task has."""
     return task.count(SEPARATOR) + 1
 
 

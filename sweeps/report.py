@@ -90,6 +90,7 @@ def field_importances(study: SweepStudy) -> dict[str, float]:
 
 
 def head_lines(sweep: SweepSpec, trials: Sequence[Plain]) -> Iterator[str]:
+    """What was searched, and how."""
     spec = search_spec(sweep)
     given_up = sum(trial["pruned"] for trial in trials)
     seeds = f"{spec.seeds} seed{'s' if spec.seeds > 1 else ''}"
@@ -131,6 +132,7 @@ def confirm_lines(sweep: SweepSpec, best: Plain, confirmed: Plain) -> Iterator[s
 
 
 def importance_lines(importances: dict[str, float]) -> Iterator[str]:
+    """How much each searched field matters; nothing where that is not known."""
     if importances:
         shares = ", ".join(f"`{path}` {share:.2f}" for path, share in importances.items())
         yield f"Importances (PED-ANOVA): {shares}."

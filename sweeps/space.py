@@ -158,4 +158,5 @@ def describe(fields: Fields) -> str:
 
 
 def short(value: Value) -> str:
+    """A value as tables print it."""
     return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -190,6 +190,7 @@ PACKAGED = resources.files("sweeps").joinpath("specs")
 
 
 def packaged_sweeps() -> list[str]:
+    """Names of the sweeps that come with the code."""
     return toml_names(PACKAGED)
 
 

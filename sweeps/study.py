@@ -201,6 +201,7 @@ def expected(metric: str) -> str:
 
 
 def directions(sweep: SweepSpec) -> list[StudyDirection]:
+    """Which way each objective is better, as Optuna has it."""
     return [
         StudyDirection.MAXIMIZE if METRICS[name].maximised else StudyDirection.MINIMIZE
         for name in sweep.objectives
@@ -216,10 +217,12 @@ def sampler(sweep: SweepSpec, number: int) -> BaseSampler:
 
 
 def wilcoxon(sweep: SweepSpec) -> WilcoxonPruner:
+    """The pruner that gives up what is worse task by task."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ExperimentalWarning)
         return WilcoxonPruner(p_threshold=sweep.pruner.p, n_startup_steps=sweep.pruner.startup)
 
 
 def feasible(trial: FrozenTrial) -> bool:
+    """Whether a trial meets every constraint."""
     return all(excess <= 0 for excess in trial.constraints.values())

@@ -27,6 +27,7 @@ MAY_CHANGE = ("trials", "enqueued", "confirm", "title", "tables")  # under a stu
 
 
 def default_out(sweep: SweepSpec) -> Path:
+    """runs/sweep-<name>-<scale>."""
     return Path("runs") / f"sweep-{sweep.name}-{sweep.scale}"
 
 

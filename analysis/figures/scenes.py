@@ -13,6 +13,8 @@ class NoPictureError(Exception):
 
 @dataclass(frozen=True)
 class Camera:
+    """Where a scene is looked at from."""
+
     lookat: tuple[float, float, float]  # m
     distance: float  # m
     azimuth: float  # degrees, as the next
@@ -21,6 +23,8 @@ class Camera:
 
 @dataclass(frozen=True)
 class View:
+    """How a benchmark's scene is drawn."""
+
     camera: Camera
     package: str  # whose folder has the model, or else its meshes and textures
     distribution: str  # what to install for it

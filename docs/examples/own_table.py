@@ -5,8 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from analysis import open_run
-from orchestrator import load_spec
-from orchestrator.work import reproduce
+from orchestrator import load_spec, reproduce
 from stitching.data.maze import MazeDataConfig
 
 where = Path(sys.argv[1] if len(sys.argv) > 1 else "example-runs")

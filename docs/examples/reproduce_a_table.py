@@ -4,8 +4,7 @@ import sys
 from pathlib import Path
 
 from analysis import open_run
-from orchestrator import load_spec
-from orchestrator.work import plan, reproduce
+from orchestrator import load_spec, plan, reproduce
 
 where = Path(sys.argv[1] if len(sys.argv) > 1 else "example-runs")
 

@@ -26,6 +26,7 @@ class Finding:
 
 
 def has_faults(findings: Iterable[Finding]) -> bool:
+    """Whether anything must be mended."""
     return any(finding.status == "fault" for finding in findings)
 
 
@@ -49,4 +50,5 @@ def as_lines(findings: Iterable[Finding]) -> list[str]:
 
 
 def gib(size: int) -> str:
+    """A number of bytes in words."""
     return f"{size // GIB} GiB"

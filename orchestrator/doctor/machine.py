@@ -14,6 +14,7 @@ ENOUGH_SHARED_MEMORY = 1 * GIB
 
 
 def judge_cores(cores: int, omp_threads: str | None) -> Finding:
+    """How many cores can be used, and whether threads would get in their way."""
     found = f"{cores} usable, OMP_NUM_THREADS {omp_threads or 'not set'}"
     if omp_threads in (None, "", "1"):
         return Finding("cores", "ok", found)
@@ -30,6 +31,7 @@ def total_memory() -> int:
 
 
 def judge_memory(size: int) -> Finding:
+    """Whether so many bytes are enough."""
     found = f"{size / GIB:.1f} GiB"
     if size < LEAST_MEMORY:
         return Finding("memory", "fault", found, f"use a machine with {gib(LEAST_MEMORY)} or more")
@@ -39,6 +41,7 @@ def judge_memory(size: int) -> Finding:
 
 
 def check_shared_memory() -> Finding:
+    """Where Ray keeps its objects."""
     folder = Path("/dev/shm")
     if not folder.is_dir():
         return Finding("shared memory", "ok", "not used on this system")
@@ -46,6 +49,7 @@ def check_shared_memory() -> Finding:
 
 
 def judge_shared_memory(free: int) -> Finding:
+    """Whether so many free bytes are enough."""
     found = f"{free / GIB:.1f} GiB free in /dev/shm"
     if free >= ENOUGH_SHARED_MEMORY:
         return Finding("shared memory", "ok", found)
@@ -54,6 +58,7 @@ def judge_shared_memory(free: int) -> Finding:
 
 
 def check_gpu() -> Finding:
+    """Which GPUs torch sees; none is needed."""
     import torch
 
     if not torch.cuda.is_available():
@@ -63,10 +68,12 @@ def check_gpu() -> Finding:
 
 
 def rendering_libraries() -> list[str]:
+    """Names of the libraries here that MuJoCo can draw with."""
     return [name for name in ("EGL", "OSMesa", "GL") if ctypes.util.find_library(name)]
 
 
 def judge_rendering(libraries: list[str]) -> Finding:
+    """Whether pictures of episodes can be drawn."""
     if libraries:
         return Finding("rendering", "ok", ", ".join(libraries))
     advice = "only pictures of episodes need it: install libegl1 or libosmesa6"

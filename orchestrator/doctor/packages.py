@@ -22,6 +22,7 @@ REASONS = {
 
 
 def judge_python(version: str) -> Finding:
+    """Whether it is the Python that the packages need."""
     if version in PYTHON:
         return Finding("Python", "ok", version)
     return Finding("Python", "fault", version, f"use Python {PYTHON}: robosuite's pins need it")
@@ -40,6 +41,7 @@ def check_packages() -> list[Finding]:
 
 
 def installed(package: str) -> str | None:
+    """The version of a package; None where there is none."""
     try:
         return importlib.metadata.version(package)
     except importlib.metadata.PackageNotFoundError:
@@ -47,6 +49,7 @@ def installed(package: str) -> str | None:
 
 
 def judge_package(requirement: Requirement, version: str | None) -> Finding:
+    """Whether an installed version meets a requirement."""
     name = requirement.name
     if version is not None and requirement.specifier.contains(version, prereleases=True):
         return Finding(name, "ok", version)
@@ -56,6 +59,7 @@ def judge_package(requirement: Requirement, version: str | None) -> Finding:
 
 
 def judge_sqlite(version: tuple[int, ...]) -> Finding:
+    """Whether SQLite is new enough."""
     found = ".".join(map(str, version))
     if version >= SQLITE:
         return Finding("SQLite", "ok", found)

@@ -35,6 +35,7 @@ def train_tiny_agent() -> dict[str, bytes]:
 
 
 def judge_determinism(first: object, second: object, seconds: float) -> Finding:
+    """Whether two trainings of the same gave the same."""
     if first == second:
         return Finding("self test", "ok", f"two trainings gave the same bytes ({seconds:.1f} s)")
     advice = "set OMP_NUM_THREADS=1 and install the pinned torch; until then runs do not repeat"

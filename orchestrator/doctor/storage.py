@@ -32,6 +32,7 @@ def check_root(root: Path) -> list[Finding]:
 
 
 def judge_disk(free: int) -> Finding:
+    """Whether so many free bytes are enough."""
     found = f"{free / GIB:.1f} GiB free"
     if free < LEAST_DISK:
         return Finding("disk", "fault", found, f"free {gib(LEAST_DISK)}, or choose another --out")
@@ -55,6 +56,7 @@ def check_locks(folder: Path) -> Finding:
 
 
 def check_wal(folder: Path) -> Finding:
+    """Whether SQLite can write ahead in a folder: not on network disks."""
     with closing(sqlite3.connect(folder / "database")) as connection:
         (mode,) = connection.execute("PRAGMA journal_mode=WAL").fetchone()
         connection.execute("CREATE TABLE t (x)")

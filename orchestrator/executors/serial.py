@@ -13,6 +13,8 @@ from orchestrator.work.worker import build, use_one_thread
 
 
 class SerialExecutor:
+    """Everything in this process, one job after the other."""
+
     workers = 1
 
     def __init__(self) -> None:

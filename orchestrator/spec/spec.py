@@ -163,6 +163,7 @@ def check_names(names: Iterable[str], where: str) -> None:
 
 
 def check_rows(table: TableSpec, where: str) -> None:
+    """Raises UsageError where tasks cannot be grouped into such rows."""
     if table.rows not in ROW_RULES:
         raise UsageError(f"{where}: no rows {table.rows!r}; there are {', '.join(ROW_RULES)}")
 

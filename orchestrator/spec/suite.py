@@ -38,6 +38,8 @@ class PartFields:
 
 @dataclass(frozen=True)
 class Part:
+    """One of a suite's runs, and what it is called there."""
+
     label: str
     spec: Spec
 
@@ -204,6 +206,7 @@ def part_directories(directory: RunDirectory) -> dict[str, RunDirectory]:
 
 
 def part_directory(directory: RunDirectory, label: str) -> RunDirectory:
+    """The run directory of a part, within its suite's."""
     return RunDirectory(directory.path / "parts" / label)
 
 

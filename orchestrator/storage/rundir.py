@@ -196,4 +196,5 @@ class Named(Protocol):
 
 
 def default_out(asked: Named) -> Path:
+    """runs/<name>-<scale>."""
     return Path("runs") / f"{asked.name}-{asked.scale}"

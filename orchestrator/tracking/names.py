@@ -17,5 +17,6 @@ def allowed_name(text: str) -> str:
 
 
 def short_text(value: Any) -> str:
+    """A value as text that MLflow takes, cut where it is too long."""
     text = value if isinstance(value, str) else json.dumps(value)
     return text if len(text) <= LONGEST_TEXT else f"{text[: LONGEST_TEXT - 1]}…"

@@ -48,6 +48,7 @@ def digest(files: Mapping[str, Path]) -> str:
 
 
 def read_receipt(run_dir: Path) -> Receipt | None:
+    """What MLflow has seen of a run; None where that is not known."""
     try:
         return Receipt(**json.loads((run_dir / "tracking.json").read_text()))
     except (OSError, ValueError, TypeError):
@@ -55,4 +56,5 @@ def read_receipt(run_dir: Path) -> Receipt | None:
 
 
 def write_receipt(run_dir: Path, receipt: Receipt) -> None:
+    """Remember what MLflow has seen of a run."""
     write_atomically(run_dir / "tracking.json", json.dumps(asdict(receipt), indent=1).encode())

@@ -37,6 +37,7 @@ def default_uri(root: Path) -> str:
 
 
 def without_password(text: str) -> str:
+    """A URI, or a text with URIs, without the users and passwords in them."""
     return re.sub(r"//[^/@\s]*@", "//", text)
 
 
@@ -46,6 +47,7 @@ def _database(uri: str) -> Path | None:
 
 
 def is_gone(uri: str) -> bool:
+    """Whether a store is a database file that is not there."""
     database = _database(uri)
     return database is not None and not database.exists()
 
@@ -96,6 +98,7 @@ def _check_unlocked(database: Path) -> None:
 
 
 def connect(uri: str) -> MlflowClient:
+    """A client of a tracking store, which is made where it is a file that is not there."""
     for name, value in SETTINGS.items():
         os.environ.setdefault(name, value)
     from mlflow import MlflowClient
@@ -114,6 +117,7 @@ def connect(uri: str) -> MlflowClient:
 
 
 def open_experiment(client: MlflowClient, uri: str, name: str) -> str:
+    """The id of an experiment, which is made where there is none."""
     from mlflow.exceptions import MlflowException
 
     found = client.get_experiment_by_name(name)

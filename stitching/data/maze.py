@@ -14,6 +14,8 @@ from stitching.streams import stream
 
 @dataclass(frozen=True)
 class MazeDataConfig(Bounded):
+    """The maze's demonstrations, and the random walks that dynamics also learn from."""
+
     episodes: Episodes = 100  # demonstrations a skill
     noise: Share = 0.02  # probability of a random move in them
     exploration_episodes: Amount = 200  # random walks from random cells, for the dynamics

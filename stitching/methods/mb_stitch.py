@@ -22,6 +22,8 @@ from stitching.planning.protocol import Plan, Score
 
 @dataclass(frozen=True)
 class MBStitchSettings(PlanningSettings):
+    """Tables 1 to 3, 7 and 9: the prices of Eq. 2, and how far a plan is followed."""
+
     limit: Amount = 5  # most stitching steps between two skills
     execute: Few = 1  # actions of each plan carried out before planning again
     alpha: NotNegative = 1.0  # α of Eq. 2, price of the value ensemble's disagreement

@@ -20,6 +20,8 @@ from stitching.models.iql import IQLConfig
 
 @dataclass(frozen=True)
 class MFStitchSettings(MethodSettings):
+    """The extra policy between two skills, and what it is learned from."""
+
     limit: Amount = 5  # most stitching steps between two skills
     mixture: Mixture = "fine-tuned"  # how the paper's "mixed" dataset is read
     training: IQLConfig = IQLConfig()  # the extra policy, learned from it

@@ -15,6 +15,8 @@ from stitching.methods.protocol import Method, MethodSettings, Models, Proposal
 
 @dataclass(frozen=True)
 class RandomStitchSettings(MethodSettings):
+    """How long chance may act."""
+
     limit: Amount = 5  # most stitching steps between two skills
 
 

@@ -22,6 +22,8 @@ from stitching.planning.objective import NORMS, Norm, spread_over_members
 
 @dataclass(frozen=True)
 class ReachStitchSettings(PlanningSettings):
+    """How a plan towards the next skill's initiation set is searched and priced."""
+
     limit: Amount = 20  # most stitching steps before a skill
     execute: Few = 1  # actions of each plan carried out before planning again
     beta: NotNegative = 0.5  # β of Eq. 2, beside a distance in standard deviations

@@ -18,6 +18,8 @@ EPISODES = 10  # played of the task, of which one is shown
 
 
 class PhysicsBlock(EpisodeBlock, Protocol):
+    """A block whose episodes MuJoCo steps."""
+
     def positions(self, rows: np.ndarray) -> np.ndarray:
         """MuJoCo's generalised positions (n, nq): what a renderer needs."""
 

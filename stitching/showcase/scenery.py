@@ -25,6 +25,8 @@ PACKAGE = "robosuite"  # whose folder has the meshes and textures
 
 @dataclass(frozen=True)
 class Scenery:
+    """Which of robosuite's models shows an episode, and what in it differs by episode."""
+
     task: str  # robosuite's name
     body: str = ""  # stands where the last seven numbers of a snapshot say: m, w x y z
 

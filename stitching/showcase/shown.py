@@ -12,6 +12,8 @@ from stitching.rollout import Play, Recorder, RolloutConfig, Segments, play_from
 
 @dataclass(frozen=True)
 class Shown:
+    """One task as several methods play it, and what it is played with."""
+
     task: tuple[str, ...]
     agent: Agent
     stitchers: dict[str, Stitcher]  # by method, as a table names it

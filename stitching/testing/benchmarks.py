@@ -20,12 +20,14 @@ ROWS = np.arange(EPISODES)
 def streams(
     episodes: Sequence[int] | np.ndarray = range(EPISODES), use: str = ""
 ) -> list[np.random.Generator]:
+    """One stream an episode, the same with every call."""
     return [stream("conformance", use, int(episode)) for episode in episodes]
 
 
 def started(
     benchmark: Benchmark, episodes: Sequence[int] | np.ndarray = range(EPISODES)
 ) -> EpisodeBlock:
+    """A block of these episodes at their start."""
     block = benchmark.block()
     block.reset(streams(episodes))
     return block
@@ -43,6 +45,7 @@ def actions_of(
 
 
 def achievements(benchmark: Benchmark, block: EpisodeBlock, rows: np.ndarray) -> np.ndarray:
+    """Which skills' goals hold: (n, skills) bool."""
     return np.stack([block.achieved(rows, skill) for skill in range(len(benchmark.skills))], axis=1)
 
 
@@ -64,6 +67,7 @@ def played(
 
 
 def midway(benchmark: Benchmark, use: str = "before") -> EpisodeBlock:
+    """A block of all episodes after some actions."""
     block = started(benchmark)
     played(benchmark, block, ROWS, actions_of(benchmark, ROWS, use))
     return block

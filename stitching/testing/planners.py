@@ -16,6 +16,7 @@ PROBLEMS = 5
 
 
 def streams(problems: int = PROBLEMS) -> list[np.random.Generator]:
+    """One stream a problem, the same with every call."""
     return [np.random.Generator(np.random.Philox(key=problem)) for problem in range(problems)]
 
 

@@ -12,6 +12,7 @@ from stitching.streams import stream
 
 
 def streams(n: int) -> list[np.random.Generator]:
+    """One stream an episode, the same with every call."""
     return [stream("conformance", i) for i in range(n)]
 
 

@@ -110,7 +110,10 @@ def test_every_field_of_a_spec_is_an_option(cli: Cli) -> None:
         (["plan", "table1", "--seeds", "many"], "--seeds"),
         (["plan", "table1", "--seeds", "0"], "seeds: must be at least 1"),
         (["plan", "table1", "--methods", "magic"], "unknown method 'magic'; there are no-stitch"),
-        (["plan", "table1", "--methods", "mb-stitch[alhpa=1]"], "valid are limit, execute, alpha"),
+        (
+            ["plan", "table1", "--methods", "mb-stitch[alhpa=1]"],
+            "valid are planner, limit, execute, alpha",
+        ),
         (["plan", "table1", "--tasks", "g0>g7"], "no skill 'g7'; it has g0, g1, g2, g3"),
         (["plan", "table1", "--executor", "serial"], "--executor"),
         (["run", "table1", "--executor", "slurm"], "ray"),

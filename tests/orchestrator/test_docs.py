@@ -34,7 +34,7 @@ def test_links_lead_somewhere(document: Path) -> None:
 
 
 def test_the_example_package_is_as_the_text_shows_it() -> None:
-    text, example = (ROOT / "docs" / "extending.md").read_text(), ROOT / "docs" / "example"
+    text, example = (ROOT / "docs" / "extending.md").read_text(), ROOT / "docs" / "example-package"
     entry_points, _ = re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL)
     assert entry_points in (example / "pyproject.toml").read_text()
     (code,) = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)

@@ -46,6 +46,8 @@ Source = Literal["orders", "single-skill", "human"]
 
 @dataclass(frozen=True)
 class KitchenDataConfig(Bounded):
+    """Kitchen's demonstrations: which there are, how many, and how steady the hand is."""
+
     source: Source = "orders"  # several skills in human orders, each alone, or people's recordings
     human: str = ""  # for people's: a Minari id such as D4RL/kitchen/complete-v2, or an .npz file
     episodes: Episodes = 24  # demonstrations an order

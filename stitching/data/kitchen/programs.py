@@ -30,6 +30,8 @@ class Waypoint:
 
 @dataclass(frozen=True)
 class Program:
+    """How a hand does one skill: waypoints about a site of the scene, and how it leaves."""
+
     site: str
     waypoints: tuple[Waypoint, ...]
     leave: tuple[float, float, float] = (

@@ -20,6 +20,8 @@ from stitching.envs.kitchen import SKILLS
 
 @dataclass(frozen=True)
 class RatesConfig:
+    """How often each skill's program succeeds: what is tried."""
+
     attempts: int = 50  # of each skill from the start pose
     episodes: int = 4  # demonstrations of each human order
     steps: int = 120  # in which a skill has to be done
@@ -73,6 +75,7 @@ def summary(attempts: Attempts) -> str:
 
 
 def main(config: RatesConfig) -> None:
+    """Print the rates as a table."""
     print(summary(success_rates(config)))
 
 

@@ -81,6 +81,7 @@ def shown_orders(demonstrations: Iterable[Sequence[Segment]]) -> list[Order]:
 
 
 def as_transitions(segments: Sequence[Segment]) -> Transitions:
+    """The segments' transitions, one episode each. DataError where there is no segment."""
     if not segments:
         raise DataError("no demonstration achieves a skill: nothing to make a dataset of")
 

@@ -23,6 +23,8 @@ from stitching.streams import stream
 
 @dataclass(frozen=True)
 class RobosuiteDataConfig(Bounded):
+    """Robosuite's demonstrations: how many, and how steady the hand is."""
+
     quality: Share = 1.0  # of the hand: from 1, an expert, down to 0, who misses most of the time
     episodes: Episodes = 100  # demonstrations a skill
     held_out: Amount = 50  # more of each skill, to judge models by

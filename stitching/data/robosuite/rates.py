@@ -26,6 +26,8 @@ from stitching.rollout import Play, RolloutConfig, play_from_start, play_segment
 
 @dataclass(frozen=True)
 class RatesConfig:
+    """How often learned skills succeed from their own starts and at hand-overs: what is tried."""
+
     task: str = "open door,close door"  # or "can,can"
     data: RobosuiteDataConfig = RobosuiteDataConfig(episodes=60)
     agent: IQLConfig = IQLConfig(width=128, policy_width=256, multi_task=False)
@@ -89,6 +91,7 @@ def lines(config: RatesConfig) -> Iterator[str]:
 
 
 def main(config: RatesConfig) -> None:
+    """Print the rates, a line each as it is known."""
     for line in lines(config):
         print(line, flush=True)
 

@@ -278,6 +278,7 @@ def fingers_at(commands: np.ndarray) -> np.ndarray:
 
 
 def arrived(reading: Readings, positions: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+    """Which of n goals an arm is at: (n, 3) m and (n, 3, 3) → (n,) bool."""
     gap = positions - reading.position
     cosine = ((rotations * reading.rotation).sum(axis=(1, 2)) - 1) / 2
     return ((gap * gap).sum(axis=1) < NEAR**2) & (cosine > np.cos(AHEAD))

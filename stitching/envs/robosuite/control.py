@@ -27,6 +27,8 @@ FINGER_MIDDLE, FINGER_SPAN = np.array([0.02, -0.02]), np.array([-0.02, 0.02])
 
 @dataclass(frozen=True)
 class Goal:
+    """Where n hands are to be, and what their arms should look like meanwhile."""
+
     position: np.ndarray  # (n, 3) m, in the world
     rotation: np.ndarray  # (n, 3, 3)
     posture: np.ndarray  # (n, 7) rad

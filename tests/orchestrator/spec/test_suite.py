@@ -28,7 +28,7 @@ from orchestrator.work.progress import Silent
 from orchestrator.work.reproduce_suite import reproduce_suite
 from tests.orchestrator.tiny import TINY, promised_bytes, serially
 
-SUITE = Path(__file__).with_name("suite.toml")
+SUITE = Path(__file__).parents[1] / "suite.toml"
 OTHER_TASKS = """
 name = "lists"
 title = "Two lists of tasks"

@@ -147,7 +147,8 @@ def test_what_a_reader_finds_in_the_spec(spec: Spec) -> None:
     assert text["tasks"] == list(spec.tasks)
     assert text["seeds"] == [0, 1]
     assert text["methods"][3] == {
-        "name": "mb-stitch", "label": "MB-Stitch", "own_first_skill": False
+        "name": "mb-stitch", "label": "MB-Stitch", "own_first_skill": False,
+        "models": ["agent", "dynamics"],
     }  # fmt: skip
     first = json.loads(
         json.dumps(describe(replace(spec, rollout=RolloutConfig(first_stitch=True))))
