@@ -34,6 +34,7 @@ bench: setup  ## ratios that the documentation quotes, each within one run
 	$(BIN)/python -m tests.bench
 
 wheel: setup  ## a wheel in dist/
+	rm -rf build  # what an earlier one left would be packed, too
 	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .
 
 clean:  ## delete what builds and checks leave; runs/ and the environment stay

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
+PACKAGES = ("stitching", "orchestrator", "sweeps", "analysis")
 
 
 def run(*command: object, folder: Path, site: Path | None = None) -> str:
@@ -25,7 +27,12 @@ def run(*command: object, folder: Path, site: Path | None = None) -> str:
 @pytest.mark.slow
 def test_a_table_is_reproduced_from_the_wheel(tmp_path: Path) -> None:
     own = ["--no-deps", "--no-build-isolation", "--quiet"]
-    run("-m", "pip", "wheel", *own, "--wheel-dir", tmp_path / "wheels", ROOT, folder=tmp_path)
+    source = tmp_path / "source"  # building leaves files behind
+    source.mkdir()
+    for name in (*PACKAGES, "pyproject.toml", "README.md"):
+        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
+        copy(ROOT / name, source / name)
+    run("-m", "pip", "wheel", *own, "--wheel-dir", tmp_path / "wheels", source, folder=tmp_path)
     (wheel,) = (tmp_path / "wheels").glob("skillstitch-*.whl")
     site, empty = tmp_path / "site", tmp_path / "empty"
     empty.mkdir()

@@ -21,5 +21,8 @@ spec = replace(
 )
 spec = replace(spec, tables=(replace(spec.tables[0], id="two-tasks", paper="", rows="task"),))
 
-directory = reproduce(spec, where / "two-tasks", store=where / "store", tracking_uri="none")
+# In this process alone, without Ray: a debugger sees everything.
+directory = reproduce(
+    spec, where / "two-tasks", store=where / "store", executor="serial", tracking_uri="none"
+)
 print(open_run(directory).scores()[["row", "method", "score", "ci_low", "ci_high"]])

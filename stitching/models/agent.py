@@ -11,8 +11,8 @@ import torch
 from torch import Tensor
 
 from stitching.envs.protocol import ActionSpace
-from stitching.models.iql import LOG_STD_RANGE
 from stitching.models.layers import Params, Precision, at_precision, mlp, named, parameters
+from stitching.models.losses import LOG_STD_RANGE
 
 
 @dataclass(frozen=True)

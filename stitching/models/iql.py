@@ -7,13 +7,11 @@ and differ by their initial weights. The policy is extracted with the members' m
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import torch
-from torch import Tensor
 
 from stitching.bounds import (
     Amount,
@@ -37,12 +35,11 @@ from stitching.envs.protocol import ActionSpace
 from stitching.models.layers import (
     Params,
     Precision,
-    at_precision,
     init_mlp,
-    mlp,
     prefixed,
     prefixed_tensors,
 )
+from stitching.models.losses import Batch, iql_losses
 from stitching.models.scale import observation_range, observation_scale
 from stitching.models.training import (
     DRAWN_AT_ONCE,
@@ -53,9 +50,6 @@ from stitching.models.training import (
     cosine,
 )
 from stitching.streams import stream
-
-LOG_STD_RANGE = (-5.0, 2.0)
-MAX_ADVANTAGE_WEIGHT = 100.0  # as in the authors' implementation
 
 
 @dataclass(frozen=True)
@@ -92,76 +86,6 @@ class IQLConfig(Bounded):
     def policy_hidden(self) -> list[int]:
         """Widths of the policy's hidden layers."""
         return [self.policy_width or self.width] * (self.policy_layers or self.hidden_layers)
-
-
-@dataclass(frozen=True)
-class Batch:
-    """One minibatch of B transitions; inputs are normalised observations next to conditions."""
-
-    inputs: Tensor  # (B, observation + condition)
-    actions: Tensor  # (B, action)
-    next_inputs: Tensor  # (B, observation + condition)
-    rewards: Tensor  # (B,)
-    continues: Tensor  # (B,) 0 where terminal, else 1
-
-
-def expectile_loss(difference: Tensor, expectile: float) -> Tensor:
-    """Eq. 5 of IQL: the asymmetric square |expectile − 1(u < 0)| u², elementwise."""
-    return torch.where(difference < 0, 1 - expectile, expectile) * difference.square()
-
-
-def twin_minimum(q: Tensor) -> Tensor:
-    """The smaller of each member's two Q-functions: (2M, B, 1) → (M, B)."""
-    return q.squeeze(-1).unflatten(0, (-1, 2)).amin(dim=1)
-
-
-def log_probability(outputs: Tensor, log_std: Tensor, actions: Tensor, discrete: bool) -> Tensor:
-    """log π(a|s): categorical over one-hot actions, or Gaussian around tanh(outputs). (B,)"""
-    if discrete:
-        return (outputs.log_softmax(-1) * actions).sum(-1)
-    log_std = log_std.clamp(*LOG_STD_RANGE)
-    scaled = (actions - outputs.tanh()) * torch.exp(-log_std)
-    return (-0.5 * scaled.square() - log_std - 0.5 * math.log(2 * math.pi)).sum(-1)
-
-
-def iql_losses(
-    q: Params,
-    q_target: Params,
-    v: Params,
-    policy: Params,
-    log_std: Tensor,
-    batch: Batch,
-    config: IQLConfig,
-    discrete: bool,
-    generator: torch.Generator,
-) -> dict[str, Tensor]:
-    """The three losses of IQL (its Eqs. 5, 6, 7), each averaged over batch and members."""
-    q, q_target, v, policy = (
-        at_precision(params, config.precision) for params in (q, q_target, v, policy)
-    )
-    state_actions = torch.cat([batch.inputs, batch.actions], dim=-1)
-    with torch.no_grad():
-        q_slow = twin_minimum(mlp(q_target, state_actions))  # (M, B)
-        v_next = mlp(v, batch.next_inputs).squeeze(-1)  # (M, B)
-        backup = batch.rewards + config.gamma * batch.continues * v_next
-
-    v_now = mlp(v, batch.inputs).squeeze(-1)
-    value_loss = expectile_loss(q_slow - v_now, config.expectile).mean()
-
-    q_now = mlp(q, state_actions).squeeze(-1).unflatten(0, (-1, 2))  # (M, 2, B)
-    q_loss = (q_now - backup.unsqueeze(1)).square().mean()
-
-    advantage = (q_slow - v_now.detach()).mean(dim=0)  # (B,)
-    weight = (config.temperature * advantage).exp().clamp(max=MAX_ADVANTAGE_WEIGHT)
-    outputs = mlp(policy, batch.inputs, dropout=config.dropout, generator=generator).squeeze(0)
-    log_prob = log_probability(outputs, log_std, batch.actions, discrete)
-    return {
-        "value_loss": value_loss,
-        "q_loss": q_loss,
-        "policy_loss": -(weight * log_prob).mean(),
-        "mean_value": v_now.detach().mean(),
-        "value_disagreement": v_now.detach().std(dim=0, correction=0).mean(),
-    }
 
 
 def train_iql(

@@ -7,8 +7,8 @@ from scipy.stats import kstest
 
 from stitching.envs.protocol import ActionSpace
 from stitching.models.agent import Agent
-from stitching.models.iql import LOG_STD_RANGE
 from stitching.models.layers import init_mlp, prefixed
+from stitching.models.losses import LOG_STD_RANGE
 from stitching.streams import stream
 
 OBSERVATION, MEMBERS, HIDDEN = 3, 4, 16

@@ -17,18 +17,15 @@ from stitching.data.transitions import DataError, Transitions
 from stitching.envs.factors import NO_OBJECT
 from stitching.envs.protocol import ActionSpace
 from stitching.models.agent import Agent
-from stitching.models.iql import (
+from stitching.models.iql import IQLConfig, minibatches, train_iql, train_single_tasks
+from stitching.models.layers import Params, init_mlp, named, parameters
+from stitching.models.losses import (
     LOG_STD_RANGE,
     MAX_ADVANTAGE_WEIGHT,
     Batch,
-    IQLConfig,
     expectile_loss,
     iql_losses,
-    minibatches,
-    train_iql,
-    train_single_tasks,
 )
-from stitching.models.layers import Params, init_mlp, named, parameters
 from stitching.models.scale import observation_scale
 from stitching.streams import stream
 
