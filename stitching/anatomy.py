@@ -18,6 +18,7 @@ import torch
 from torch import Tensor
 
 from stitching.data.transitions import Transitions
+from stitching.demonstrated_states import DemonstratedStates
 from stitching.envs.protocol import Benchmark, EpisodeBlock
 from stitching.methods.mb_stitch import MBStitch
 from stitching.methods.no_stitch import NoStitch
@@ -26,7 +27,6 @@ from stitching.models.agent import Agent
 from stitching.planning.objective import NORMS, spread_over_members
 from stitching.planning.protocol import Plan
 from stitching.rollout import Play, Recorder, RolloutConfig, Segments, begin, play_segment
-from stitching.surroundings import Surroundings
 
 DIGITS = 5  # after the point, of what is recorded
 
@@ -38,7 +38,7 @@ Numbers = dict[str, float]
 
 
 @dataclass(frozen=True)
-class Subject:
+class StudiedMethod:
     """Whose stitches are looked at, played as an evaluation plays them."""
 
     benchmark: Benchmark
@@ -87,21 +87,21 @@ class Trace:
     value: list[float] = field(default_factory=list)  # (n + 1) E[V] of real states, start first
     spread: list[float] = field(default_factory=list)  # (n + 1) of the value's members there
     distance: list[float] = field(default_factory=list)  # (n + 1) to the next skill's own data
-    plans: list[Numbers] = field(default_factory=list)  # those made, see `Witness.foresee`
+    plans: list[Numbers] = field(default_factory=list)  # those made, see `StitchRecorder.foresee`
 
     def as_plain(self) -> dict[str, Any]:
         return dict(vars(self))
 
 
-class Witness:
+class StitchRecorder:
     """MB-Stitch that writes down what it expects, and the recorder of what then happens.
 
     Both at once, for a stitch's steps follow its plans. Changes nothing in either.
     """
 
-    def __init__(self, subject: Subject, near: Surroundings) -> None:
-        self._stitcher = subject.stitcher
-        self._agent, self._near = subject.agent, near
+    def __init__(self, studied: StudiedMethod, near: DemonstratedStates) -> None:
+        self._stitcher = studied.stitcher
+        self._agent, self._near = studied.agent, near
         self._expected: list[Numbers] = []  # of plans whose first action is still to be taken
         self.traces: dict[int, Trace] = {}  # by episode
 
@@ -173,7 +173,7 @@ class Witness:
 
 @torch.inference_mode()
 def anatomy(
-    subject: Subject, data: Transitions, pairs: Sequence[Pair], episodes: int
+    studied: StudiedMethod, data: Transitions, pairs: Sequence[Pair], episodes: int
 ) -> dict[str, Any]:
     """The first `episodes` episodes of every pair of skills, with and without MB-Stitch, as JSON.
 
@@ -183,22 +183,22 @@ def anatomy(
     ways; "typical_distance" says by skill how near to one another demonstrations are.
     data: what the skills were learned from.
     """
-    dynamics = subject.stitcher.dynamics
-    ends = {skill: _end_of(subject, skill, episodes) for skill in sorted({a for a, _ in pairs})}
+    dynamics = studied.stitcher.dynamics
+    ends = {skill: _end_of(studied, skill, episodes) for skill in sorted({a for a, _ in pairs})}
     places = {pair: ends[pair[0]] for pair in pairs}
-    if subject.rollout.first_stitch:
-        start = Boundary(range(episodes), None, np.full(episodes, subject.step_limit))
+    if studied.rollout.first_stitch:
+        start = Boundary(range(episodes), None, np.full(episodes, studied.step_limit))
         places = {(START, skill): start for skill in ends} | places
     near = {
-        skill: Surroundings.of(data, subject.number(skill), dynamics)
+        skill: DemonstratedStates.of(data, studied.number(skill), dynamics)
         for skill in sorted({second for _, second in places})
     }
     typical = {skill: around.typical() for skill, around in near.items()}
     return {
         "episodes": episodes,
-        "limit": subject.stitcher.limit,
-        "alpha": subject.stitcher.settings.alpha,
-        "beta": subject.stitcher.settings.beta,
+        "limit": studied.stitcher.limit,
+        "alpha": studied.stitcher.settings.alpha,
+        "beta": studied.stitcher.settings.beta,
         "typical_distance": {
             skill: None if distance is None else round(distance, DIGITS)
             for skill, distance in typical.items()
@@ -211,7 +211,7 @@ def anatomy(
             stitch
             for pair, place in places.items()
             if place.episodes
-            for stitch in _both_ways(subject, near[pair[1]], pair, place)
+            for stitch in _both_ways(studied, near[pair[1]], pair, place)
         ],
     }
 
@@ -225,10 +225,10 @@ class Boundary:
     budget: np.ndarray  # (n,) steps that are left
 
 
-def _end_of(subject: Subject, skill: str, episodes: int) -> Boundary:
+def _end_of(studied: StudiedMethod, skill: str, episodes: int) -> Boundary:
     """Where No-Stitch's first skill succeeded."""
-    budget = np.full(episodes, subject.step_limit)
-    first = subject.segment(subject.play("", range(episodes), skill), None, NoStitch(), budget)
+    budget = np.full(episodes, studied.step_limit)
+    first = studied.segment(studied.play("", range(episodes), skill), None, NoStitch(), budget)
     succeeded = np.flatnonzero(first.success)
     return Boundary(
         succeeded.tolist(), first.snapshots[succeeded], (budget - first.steps)[succeeded]
@@ -236,21 +236,21 @@ def _end_of(subject: Subject, skill: str, episodes: int) -> Boundary:
 
 
 def _both_ways(
-    subject: Subject, near: Surroundings, pair: Pair, place: Boundary
+    studied: StudiedMethod, near: DemonstratedStates, pair: Pair, place: Boundary
 ) -> list[dict[str, Any]]:
     """Every episode that stands before the pair's second skill, without and with a stitch."""
     prefix = [skill for skill in pair if skill != START]
-    plain = subject.segment(
-        subject.play("no-stitch", place.episodes, *prefix),
+    plain = studied.segment(
+        studied.play("no-stitch", place.episodes, *prefix),
         place.snapshots,
         NoStitch(),
         place.budget,
     )
-    witness = Witness(subject, near)
-    play = subject.play("mb-stitch", place.episodes, *prefix)
-    before = subject.boundary(play, place.snapshots)
-    witness.look(before, place.episodes, subject.number(pair[1]))
-    stitched = subject.segment(play, place.snapshots, witness, place.budget, witness)
+    recorder = StitchRecorder(studied, near)
+    play = studied.play("mb-stitch", place.episodes, *prefix)
+    before = studied.boundary(play, place.snapshots)
+    recorder.look(before, place.episodes, studied.number(pair[1]))
+    stitched = studied.segment(play, place.snapshots, recorder, place.budget, recorder)
     return [
         {
             "first": pair[0],
@@ -260,7 +260,7 @@ def _both_ways(
             "succeeds_with": bool(stitched.success[row]),
             "steps_without": int(plain.steps[row]),
             "steps_with": int(stitched.steps[row]),
-            **witness.traces[episode].as_plain(),
+            **recorder.traces[episode].as_plain(),
         }
         for row, episode in enumerate(place.episodes)
     ]

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from orchestrator.spec.spec import Spec
 from orchestrator.spec.structure import Plain
-from sweeps.arena import Arena
+from sweeps.player import SpecPlayer
 from sweeps.space import describe
 from sweeps.spec import SweepSpec, base_spec, split_tasks
 from sweeps.study import RESULT, SweepStudy
@@ -34,7 +34,7 @@ def confirm_spec(sweep: SweepSpec) -> tuple[Spec, tuple[int, ...]]:
     return spec, seeds
 
 
-def confirm(sweep: SweepSpec, study: SweepStudy, arena: Arena) -> Plain:
+def confirm(sweep: SweepSpec, study: SweepStudy, player: SpecPlayer) -> Plain:
     """The best trials beside the base's own setting, measured as in the search.
 
     The winner is the search's best. The others are there to compare it with: a winner chosen by
@@ -45,7 +45,7 @@ def confirm(sweep: SweepSpec, study: SweepStudy, arena: Arena) -> Plain:
         return {}
     spec, seeds = confirm_spec(sweep)
     candidates = [study.fields(trial) for trial in best]
-    *showings, base = sweep.question.play(arena, spec, [*candidates, {}], seeds)
+    *showings, base = sweep.question.play(player, spec, [*candidates, {}], seeds)
     rows = []
     for trial, showing in zip(best, showings, strict=True):
         names = (sweep.name, "confirm", str(trial.number))

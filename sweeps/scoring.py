@@ -21,8 +21,8 @@ from orchestrator.spec.methods import first_method
 from orchestrator.spec.spec import Spec
 from orchestrator.spec.structure import Plain
 from stitching.methods.mb_stitch import MBStitchSettings
-from sweeps.arena import Arena, Played
 from sweeps.candidates import NO_STITCH, group
+from sweeps.player import Played, SpecPlayer
 from sweeps.space import Fields
 
 
@@ -95,15 +95,15 @@ class Showing:
 
 
 def play_candidates(
-    arena: Arena, base: Spec, candidates: Sequence[Fields], seeds: Sequence[int] | None = None
+    player: SpecPlayer, base: Spec, candidates: Sequence[Fields], seeds: Sequence[int] | None = None
 ) -> list[Showing]:
     """All candidates on the base's tasks and episodes; what they share is played once."""
     showings: dict[int, Showing] = {}
     baseline = pd.DataFrame()
     groups = group(candidates, base, f"sweep over {base.name}")
-    arena.prepare([one.spec for one in groups], seeds)
+    player.prepare([one.spec for one in groups], seeds)
     for one in groups:
-        played = arena.play(one.spec, seeds)
+        played = player.play(one.spec, seeds)
         if NO_STITCH in one.spec.methods:
             baseline = _of(played.episodes, NO_STITCH)
         for place, method in one.methods.items():

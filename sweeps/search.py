@@ -14,7 +14,7 @@ from orchestrator.spec.spec import Spec
 from orchestrator.spec.structure import Plain
 from orchestrator.work.progress import Progress
 from stitching.streams import stream
-from sweeps.arena import Arena
+from sweeps.player import SpecPlayer
 from sweeps.questions.question import Showing
 from sweeps.space import describe
 from sweeps.spec import SweepSpec, base_spec, split_tasks
@@ -55,7 +55,7 @@ def rounds(spec: Spec, count: int) -> list[Spec]:
 
 
 def run_search(
-    sweep: SweepSpec, study: SweepStudy, arena: Arena, progress: Progress
+    sweep: SweepSpec, study: SweepStudy, player: SpecPlayer, progress: Progress
 ) -> Iterator[None]:
     """Play and tell every trial that is missing; yields after each batch."""
     spec = search_spec(sweep)
@@ -63,7 +63,7 @@ def run_search(
     while batch := study.next_batch():
         # With some of a batch told, the others' results are there: they were kept before.
         unplayed = [trial for trial in batch if RESULT not in trial.user_attrs]
-        _play_batch(sweep, spec, study, unplayed, arena)
+        _play_batch(sweep, spec, study, unplayed, player)
         study.tell(batch)
         for trial in batch:
             progress.advance()
@@ -72,7 +72,7 @@ def run_search(
 
 
 def _play_batch(
-    sweep: SweepSpec, spec: Spec, study: SweepStudy, batch: list[FrozenTrial], arena: Arena
+    sweep: SweepSpec, spec: Spec, study: SweepStudy, batch: list[FrozenTrial], player: SpecPlayer
 ) -> None:
     """Play trials and keep their results, those of given-up ones on what they played."""
     places = {
@@ -85,7 +85,7 @@ def _play_batch(
     shown: dict[int, tuple[Showing, int]] = {}  # number → what it did, in how many rounds
     for done, part in enumerate(parts, start=1):
         fields = [study.fields(trial) for trial in going_on]
-        showings = sweep.question.play(arena, part, fields, None)
+        showings = sweep.question.play(player, part, fields, None)
         shown |= {t.number: (s, done) for t, s in zip(going_on, showings, strict=True)}
         if len(parts) == 1:
             break

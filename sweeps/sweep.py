@@ -13,8 +13,8 @@ from orchestrator.storage.rundir import SWEEP, RunDirectory
 from orchestrator.storage.store import storage_errors
 from orchestrator.work.progress import Progress
 from orchestrator.work.reproduce import LazyExecutor, Settings
-from sweeps.arena import Arena, Tally
 from sweeps.confirm import confirm
+from sweeps.player import CountingExecutor, SpecPlayer
 from sweeps.report import write_report
 from sweeps.search import run_search, search_spec
 from sweeps.space import describe
@@ -63,30 +63,30 @@ def carry_out(
             progress.say(f"{study.path}: cut {study.cut} bytes of a line torn by a kill")
         ledger = directory.ledger()
         earlier = directory.read_json("counts.json") or {}
-        arena = Arena(settings.store, ledger, LazyExecutor(settings), progress)
+        player = SpecPlayer(settings.store, ledger, LazyExecutor(settings), progress)
         tracker = Tracker(settings.resolved_tracking_uri(), directory, run_id, progress)
         finished = False
         try:
             with storage_errors(directory.path):
                 if sweep.question.shared:  # else every trial has its own models, as it comes
-                    arena.prepare([search_spec(sweep)])
-                with arena.quietly():
-                    for _ in run_search(sweep, study, arena, progress):
-                        _write_results(directory, study, arena.tally, earlier)
+                    player.prepare([search_spec(sweep)])
+                with player.quietly():
+                    for _ in run_search(sweep, study, player, progress):
+                        _write_results(directory, study, player.executor, earlier)
                         tracker.publish("RUNNING", patient=True)
-                _write_results(directory, study, arena.tally, earlier)
-                directory.write_json("confirm.json", confirm(sweep, study, arena))
+                _write_results(directory, study, player.executor, earlier)
+                directory.write_json("confirm.json", confirm(sweep, study, player))
                 directory.write_json("winner.json", winner(directory, study))
                 directory.write_json("provenance.json", provenance() | {"run_id": run_id})
                 if sweep.tables:
-                    with arena.quietly():
-                        write_table(sweep, arena, directory.path / "table")
-                _write_counts(directory, arena.tally, earlier)
+                    with player.quietly():
+                        write_table(sweep, player, directory.path / "table")
+                _write_counts(directory, player.executor, earlier)
                 write_report(sweep, study, directory, results, force=force)
             finished = True
         finally:
-            _write_counts(directory, arena.tally, earlier)
-            arena.close()
+            _write_counts(directory, player.executor, earlier)
+            player.close()
             ledger.close()
             tracker.publish("FINISHED" if finished else "FAILED")
     return directory
@@ -143,10 +143,10 @@ def winner(directory: RunDirectory, study: SweepStudy) -> Plain:
 
 
 def _write_results(
-    directory: RunDirectory, study: SweepStudy, tally: Tally, earlier: Plain
+    directory: RunDirectory, study: SweepStudy, executor: CountingExecutor, earlier: Plain
 ) -> None:
     _write_trials(directory, study)
-    _write_counts(directory, tally, earlier)
+    _write_counts(directory, executor, earlier)
 
 
 def _write_trials(directory: RunDirectory, study: SweepStudy) -> None:
@@ -163,10 +163,10 @@ def _write_trials(directory: RunDirectory, study: SweepStudy) -> None:
     directory.write_json("trials.json", trials)
 
 
-def _write_counts(directory: RunDirectory, tally: Tally, earlier: Plain) -> None:
+def _write_counts(directory: RunDirectory, executor: CountingExecutor, earlier: Plain) -> None:
     """What this command did, on top of what the commands before it did."""
     counts: Plain = {}
-    for name, own in tally.counts().items():
+    for name, own in executor.counts().items():
         before = earlier.get(name, {})
         counts[name] = {k: before.get(k, 0) + own.get(k, 0) for k in sorted({*before, *own})}
     directory.write_json("counts.json", counts)

@@ -11,8 +11,8 @@ from orchestrator.storage.exports import write_readable
 from orchestrator.storage.provenance import provenance
 from orchestrator.storage.rundir import RunDirectory, describe
 from orchestrator.work.plan import make_plan
-from sweeps.arena import Arena
 from sweeps.candidates import NO_STITCH, group
+from sweeps.player import SpecPlayer
 from sweeps.search import search_spec
 from sweeps.spec import SweepSpec
 
@@ -32,13 +32,13 @@ def table_spec(sweep: SweepSpec) -> Spec:
     )
 
 
-def write_table(sweep: SweepSpec, arena: Arena, path: Path) -> None:
+def write_table(sweep: SweepSpec, player: SpecPlayer, path: Path) -> None:
     """The readable files of a run and its report; plays nothing that the search has not."""
     spec = table_spec(sweep)
-    arena.play(spec)
+    player.play(spec)
     directory, plan = RunDirectory(path), replace(make_plan(spec), illustrations={})
     path.mkdir(parents=True, exist_ok=True)
     directory.write_json("spec.json", describe(spec))
-    counts = write_readable(plan, arena.store, arena.ledger, directory)
+    counts = write_readable(plan, player.store, player.ledger, directory)
     directory.write_json("provenance.json", provenance() | {"counts": counts})
     build_report(path)

@@ -14,7 +14,7 @@ from orchestrator.builders.parts import Builder, Inputs
 from orchestrator.spec.methods import method_of
 from orchestrator.spec.structure import Plain, structure
 from orchestrator.storage.store import Artifact
-from stitching.anatomy import Subject, anatomy
+from stitching.anatomy import StudiedMethod, anatomy
 from stitching.data.transitions import Transitions, concatenate
 from stitching.diagnosis import competence, prediction_errors, prices, value_progress
 from stitching.envs.maze import Maze
@@ -120,7 +120,7 @@ class Studies:
         ((method, settings),) = params["methods"]
         stitcher = _stitcher(method, settings, models)
         assert isinstance(stitcher, MBStitch)
-        subject = Subject(
+        studied = StudiedMethod(
             benchmark,
             models.agent,
             stitcher,
@@ -132,4 +132,4 @@ class Studies:
         learned_from = (role for role in sorted(inputs) if role not in models.trained)
         data = concatenate([Transitions(**inputs[role].arrays) for role in learned_from])
         pairs = [(first, second) for first, second in params["pairs"]]
-        return Artifact({}, anatomy(subject, data, pairs, params["episodes"]))
+        return Artifact({}, anatomy(studied, data, pairs, params["episodes"]))

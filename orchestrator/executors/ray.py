@@ -189,7 +189,7 @@ def _start(workers: int | None, address: str | None) -> None:
     environment = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
     if address is not None:
         try:
-            _knock(address)
+            _can_connect(address)
             with own_handler_kept():
                 ray.init(address=address, runtime_env={"env_vars": environment}, **common)
         except (OSError, ValueError, RuntimeError) as error:
@@ -206,7 +206,7 @@ def _start(workers: int | None, address: str | None) -> None:
         )
 
 
-def _knock(address: str) -> None:
+def _can_connect(address: str) -> None:
     """Find out in seconds that nobody is there; Ray itself tries for minutes."""
     host, _, port = address.rpartition(":")
     if host and port.isdigit():

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 from analysis.writers import markdown_table, seed_note
 from orchestrator.spec.spec import Spec
 from orchestrator.spec.structure import Plain
-from sweeps.arena import Arena
 from sweeps.candidates import NO_STITCH
+from sweeps.player import SpecPlayer
 from sweeps.questions.question import SHOWN, Metric, Question
 from sweeps.scoring import Showing, pareto_front, play_candidates
 from sweeps.space import Fields
@@ -31,9 +31,13 @@ class GainQuestion(Question[Showing]):
     searched = ("mb_stitch", "agent", "dynamics", "data", "rollout")
 
     def play(
-        self, arena: Arena, base: Spec, candidates: Sequence[Fields], seeds: Sequence[int] | None
+        self,
+        player: SpecPlayer,
+        base: Spec,
+        candidates: Sequence[Fields],
+        seeds: Sequence[int] | None,
     ) -> list[Showing]:
-        return play_candidates(arena, base, candidates, seeds)
+        return play_candidates(player, base, candidates, seeds)
 
     def again(self, found: Plain, showing: Showing, base: Showing, *names: str) -> Plain:
         over_base = showing.gain_over(base.episodes, *names, "over the base")

@@ -20,7 +20,7 @@ from orchestrator.errors import UsageError
 from orchestrator.spec.methods import method_label
 from orchestrator.spec.spec import Spec
 from orchestrator.spec.structure import Plain
-from sweeps.arena import Arena, Played
+from sweeps.player import Played, SpecPlayer
 from sweeps.questions.question import SHOWN, Metric, Question
 from sweeps.space import Fields, replaced
 
@@ -84,12 +84,16 @@ class MisfitQuestion(Question[Profiled]):
             )
 
     def play(
-        self, arena: Arena, base: Spec, candidates: Sequence[Fields], seeds: Sequence[int] | None
+        self,
+        player: SpecPlayer,
+        base: Spec,
+        candidates: Sequence[Fields],
+        seeds: Sequence[int] | None,
     ) -> list[Profiled]:
         where = f"sweep over {base.name}"
         specs = [replaced(base, fields, where) for fields in candidates]
-        arena.prepare(specs, seeds)
-        return [profiled(arena.play(spec, seeds), spec.methods) for spec in specs]
+        player.prepare(specs, seeds)
+        return [profiled(player.play(spec, seeds), spec.methods) for spec in specs]
 
     def again(self, found: Plain, showing: Profiled, base: Profiled, *names: str) -> Plain:
         return {"search_misfit": found["misfit"]} | showing.result(*names)

@@ -9,7 +9,7 @@ from typing import Generic, Protocol, TypeVar
 
 from orchestrator.spec.spec import Spec
 from orchestrator.spec.structure import Plain
-from sweeps.arena import Arena
+from sweeps.player import SpecPlayer
 from sweeps.space import Fields
 
 SHOWN = 10  # of the best trials
@@ -59,7 +59,11 @@ class Question(ABC, Generic[S]):
 
     @abstractmethod
     def play(
-        self, arena: Arena, base: Spec, candidates: Sequence[Fields], seeds: Sequence[int] | None
+        self,
+        player: SpecPlayer,
+        base: Spec,
+        candidates: Sequence[Fields],
+        seeds: Sequence[int] | None,
     ) -> list[S]:
         """All candidates on the base's tasks and episodes, of all its seeds or some."""
 

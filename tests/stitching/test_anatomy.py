@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from stitching.anatomy import START, Subject, anatomy
+from stitching.anatomy import START, StudiedMethod, anatomy
 from stitching.data.transitions import Transitions
 from stitching.envs.maze import Maze
 from stitching.methods.mb_stitch import MBStitch
@@ -34,9 +34,9 @@ class EveryOther(MBStitch):
 
 
 @pytest.fixture(scope="module", params=["mb-stitch", "mb-stitch[execute=1]", "every other"])
-def subject(
+def studied(
     maze: Maze, agent: Agent, stitchers: dict[str, Stitcher], request: pytest.FixtureRequest
-) -> Subject:
+) -> StudiedMethod:
     declines = request.param == "every other"
     stitcher = stitchers["mb-stitch[execute=1]" if declines else request.param]
     assert isinstance(stitcher, MBStitch)
@@ -45,31 +45,31 @@ def subject(
             **{each.name: getattr(stitcher, each.name) for each in fields(stitcher)}
         )
     rollout = RolloutConfig(first_stitch=True)
-    return Subject(maze, agent, stitcher, rollout, LIMIT, root_seed=0, seed=0)
+    return StudiedMethod(maze, agent, stitcher, rollout, LIMIT, root_seed=0, seed=0)
 
 
 @pytest.fixture(scope="module")
-def study(subject: Subject, demonstrations: Transitions) -> dict[str, Any]:
-    return anatomy(subject, demonstrations, PAIRS, EPISODES)
+def study(studied: StudiedMethod, demonstrations: Transitions) -> dict[str, Any]:
+    return anatomy(studied, demonstrations, PAIRS, EPISODES)
 
 
 @pytest.mark.parametrize("pair", STARTS + PAIRS)
 def test_both_ways_are_as_an_evaluation_plays_them(
-    subject: Subject, study: dict[str, Any], pair: tuple[str, str]
+    studied: StudiedMethod, study: dict[str, Any], pair: tuple[str, str]
 ) -> None:
     """A pair's own first skill is No-Stitch's, whoever goes on from there."""
     own = [s for s in study["stitches"] if (s["first"], s["second"]) == pair]
     prefix = tuple(skill for skill in pair if skill != START)
     first_stitch = pair in STARTS
-    rollout = replace(subject.rollout, first_stitch=first_stitch)
+    rollout = replace(studied.rollout, first_stitch=first_stitch)
     ways: dict[str, tuple[str, Stitcher]] = {
         "without": ("no-stitch", NoStitch()),
-        "with": ("mb-stitch", subject.stitcher),
+        "with": ("mb-stitch", studied.stitcher),
     }
     for way, (method, stitcher) in ways.items():
-        play = Play(0, subject.benchmark.name, 0, method, tuple(range(EPISODES)), prefix)
+        play = Play(0, studied.benchmark.name, 0, method, tuple(range(EPISODES)), prefix)
         *before, last = play_from_start(
-            subject.benchmark.block(), subject.agent, stitcher, subject.benchmark,
+            studied.benchmark.block(), studied.agent, stitcher, studied.benchmark,
             rollout, play, LIMIT,
         )  # fmt: skip
         arrived = np.flatnonzero(before[0].success) if before else np.arange(EPISODES)
@@ -86,9 +86,9 @@ def test_both_ways_are_as_an_evaluation_plays_them(
 
 
 def test_first_skills_are_taken_apart_only_where_they_are_stitched_to(
-    subject: Subject, study: dict[str, Any], demonstrations: Transitions
+    studied: StudiedMethod, study: dict[str, Any], demonstrations: Transitions
 ) -> None:
-    between = replace(subject, rollout=RolloutConfig())
+    between = replace(studied, rollout=RolloutConfig())
     assert any(s["plans"] for s in study["stitches"] if s["first"] == START)
     without = anatomy(between, demonstrations, PAIRS, EPISODES)
     pairs = [(pair["first"], pair["second"]) for pair in study["pairs"]]
@@ -97,25 +97,27 @@ def test_first_skills_are_taken_apart_only_where_they_are_stitched_to(
     assert without["stitches"] == [s for s in study["stitches"] if s["first"] != START]
 
 
-def test_some_stitch_is_taken_apart_step_by_step(subject: Subject, study: dict[str, Any]) -> None:
+def test_some_stitch_is_taken_apart_step_by_step(
+    studied: StudiedMethod, study: dict[str, Any]
+) -> None:
     assert any(stitch["plans"] for stitch in study["stitches"])
     for stitch in study["stitches"]:
         steps = len(stitch["value"]) - 1
         assert len(stitch["spread"]) == len(stitch["distance"]) == steps + 1
-        plans = range(0, steps, subject.stitcher.settings.execute)
+        plans = range(0, steps, studied.stitcher.settings.execute)
         assert [plan["step"] for plan in stitch["plans"]] == list(plans)
 
 
 def test_plans_are_written_down_as_eq_2_sees_them(
-    subject: Subject, demonstrations: Transitions
+    studied: StudiedMethod, demonstrations: Transitions
 ) -> None:
     """With plans of one action the objective is made of the very terms that are written down."""
     planner = RandomShooting(population=30, horizon=1)
     settings = replace(
-        subject.stitcher.settings, random_shooting=planner, alpha=2.0, beta=3.0, execute=1
+        studied.stitcher.settings, random_shooting=planner, alpha=2.0, beta=3.0, execute=1
     )
-    stitcher = replace(subject.stitcher, settings=settings)
-    short = anatomy(replace(subject, stitcher=stitcher), demonstrations, PAIRS[:1], EPISODES)
+    stitcher = replace(studied.stitcher, settings=settings)
+    short = anatomy(replace(studied, stitcher=stitcher), demonstrations, PAIRS[:1], EPISODES)
     plans = [plan for stitch in short["stitches"] for plan in stitch["plans"]]
     assert plans
     for plan in plans:
@@ -123,14 +125,14 @@ def test_plans_are_written_down_as_eq_2_sees_them(
         assert plan["objective"] == pytest.approx(expected, abs=2e-4)
 
 
-def test_real_values_are_the_agent_s(subject: Subject, study: dict[str, Any]) -> None:
+def test_real_values_are_the_agent_s(studied: StudiedMethod, study: dict[str, Any]) -> None:
     (stitch, *_) = (s for s in study["stitches"] if (s["first"], s["second"]) == PAIRS[0])
-    play = Play(0, subject.benchmark.name, 0, "", (stitch["episode"],), PAIRS[0][:1])
-    block = subject.benchmark.block()
+    play = Play(0, studied.benchmark.name, 0, "", (stitch["episode"],), PAIRS[0][:1])
+    block = studied.benchmark.block()
     first = play_from_start(
-        block, subject.agent, NoStitch(), subject.benchmark, subject.rollout, play, LIMIT
+        block, studied.agent, NoStitch(), studied.benchmark, studied.rollout, play, LIMIT
     )
     assert first[0].success.all()
-    values = subject.agent.values(torch.from_numpy(block.observe(np.arange(1))), 0)
+    values = studied.agent.values(torch.from_numpy(block.observe(np.arange(1))), 0)
     assert stitch["value"][0] == pytest.approx(float(values.mean(dim=0)), abs=1e-4)
     assert stitch["spread"][0] == pytest.approx(float(spread_over_members(values)), abs=1e-4)

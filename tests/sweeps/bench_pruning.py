@@ -12,8 +12,8 @@ from orchestrator.storage.rundir import RunDirectory
 from orchestrator.work.progress import Silent
 from orchestrator.work.reproduce import LazyExecutor
 from orchestrator.work.worker import use_one_thread
-from sweeps.arena import Arena
 from sweeps.confirm import confirm_spec
+from sweeps.player import SpecPlayer
 from sweeps.scoring import play_candidates
 from sweeps.spec import Confirm, Pruner, SweepSpec, load_sweep
 from tests.bench.result import HEADER, Result
@@ -64,9 +64,9 @@ def _winners(sweep: SweepSpec, first: Path, second: Path) -> Result:
     spec, _ = confirm_spec(replace(sweep, confirm=Confirm(seeds=(1,))))
     spec = replace(spec, seeds=1, episodes=100)
     ledger = RunDirectory(first / "sweep").ledger()
-    arena = Arena(first / "store", ledger, LazyExecutor(settings(first)), Silent())
-    one, other = play_candidates(arena, spec, [winner["fields"] for winner in winners])
-    arena.close()
+    player = SpecPlayer(first / "store", ledger, LazyExecutor(settings(first)), Silent())
+    one, other = play_candidates(player, spec, [winner["fields"] for winner in winners])
+    player.close()
     ledger.close()
     gain = other.gain_over(one.episodes, "pruning")
     return Result(

@@ -19,8 +19,8 @@ from orchestrator.storage.rundir import describe
 from orchestrator.work.plan import make_plan
 from orchestrator.work.progress import Silent
 from stitching.data.kitchen.demonstrations import KitchenDataConfig
-from sweeps.arena import Arena, Played
 from sweeps.costs import plan_lines
+from sweeps.player import Played, SpecPlayer
 from sweeps.search import search_spec
 from sweeps.space import Dimension
 from sweeps.spec import Confirm, Pruner, SweepSpec, load_sweep
@@ -36,7 +36,7 @@ def data_sweep(**changes: Any) -> SweepSpec:
     return replace(load_sweep("kitchen-data", "smoke"), **{"enqueued": (), **changes})
 
 
-def made_up(self: Arena, spec: Spec, seeds: Iterable[int] | None = None) -> Played:
+def made_up(self: SpecPlayer, spec: Spec, seeds: Iterable[int] | None = None) -> Played:
     """Skills as the paper's tables imply them where quality is BEST, and further off elsewhere."""
     seeds = tuple(range(spec.seeds) if seeds is None else seeds)
     assert isinstance(spec.data, KitchenDataConfig)
@@ -68,8 +68,8 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Path:
         sampler="grid", space=SPACE, confirm=Confirm(best=2), settings=settings_of(20)
     )
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(Arena, "prepare", lambda *_: None)
-        patched.setattr(Arena, "play", made_up)
+        patched.setattr(SpecPlayer, "prepare", lambda *_: None)
+        patched.setattr(SpecPlayer, "play", made_up)
         carry_out(sweep, settings(root), Silent(), root / "results")
     return root / "sweep"
 

@@ -5,14 +5,14 @@ import pytest
 import torch
 
 from stitching.data.transitions import Transitions
+from stitching.demonstrated_states import DemonstratedStates
 from stitching.models.dynamics import Dynamics
-from stitching.surroundings import Surroundings
 
 
 def test_demonstrated_states_are_at_no_distance(
     demonstrations: Transitions, dynamics: Dynamics
 ) -> None:
-    near = Surroundings.of(demonstrations, 2, dynamics)
+    near = DemonstratedStates.of(demonstrations, 2, dynamics)
     rows = np.concatenate(demonstrations.episode_rows(2))
     own = dynamics.scaled(torch.from_numpy(demonstrations.observations[rows]))
     assert near.distances(own).max() == 0
@@ -38,5 +38,5 @@ def test_demonstrations_are_typically_as_far_apart_as_they_are() -> None:
         episode_skills=np.array([0, 0, 1]),
         episode_successes=np.ones(3, dtype=bool),
     )
-    assert Surroundings.of(data, 0, Unscaled()).typical() == pytest.approx(0.5)
-    assert Surroundings.of(data, 1, Unscaled()).typical() is None
+    assert DemonstratedStates.of(data, 0, Unscaled()).typical() == pytest.approx(0.5)
+    assert DemonstratedStates.of(data, 1, Unscaled()).typical() is None

@@ -15,7 +15,7 @@ SAMPLED_STATES = 200  # of a skill's demonstrations, to say how near to one anot
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class DemonstratedStates:
     """The states in which one skill was demonstrated, and how far from them others are.
 
     Distances are Euclidean, every dimension in units of its standard deviation in the data, over
@@ -26,7 +26,7 @@ class Surroundings:
     demonstrations: Tensor  # (N,) int64, which of them each state is of
 
     @classmethod
-    def of(cls, data: Transitions, skill: int, dynamics: Dynamics) -> Surroundings:
+    def of(cls, data: Transitions, skill: int, dynamics: Dynamics) -> DemonstratedStates:
         rows = data.episode_rows(skill)
         numbers = np.repeat(np.arange(len(rows)), [len(each) for each in rows])
         chosen = np.concatenate([np.empty(0, dtype=np.int64), *rows])

@@ -39,7 +39,7 @@ class Played:
 
 
 @dataclass
-class Tally:
+class CountingExecutor:
     """An executor that counts what it was asked to do, and is handed each artifact but once."""
 
     inner: Executor
@@ -101,14 +101,14 @@ class Quiet(Silent):
         self._progress.say(message)
 
 
-class Arena:
+class SpecPlayer:
     """Plays specs, finding whatever any run over the same store has finished."""
 
     def __init__(self, store: Path, ledger: Ledger, executor: Executor, progress: Progress) -> None:
         self.store = Store(store)
         self.ledger = ledger
         self.shared = Ledger(store / "blocks.sqlite")
-        self.tally = Tally(executor)
+        self.executor = CountingExecutor(executor)
         self.progress = progress
         self._whole: set[str] = set()  # artifacts that are there, each checked but once
 
@@ -134,7 +134,7 @@ class Arena:
         wanted = _seeds(spec, seeds)
         plan = only_seeds(make_plan(spec), wanted)
         self._build([plan])
-        Evaluation(plan, self.store, self.ledger, self.shared, self.tally, self.progress).run()
+        Evaluation(plan, self.store, self.ledger, self.shared, self.executor, self.progress).run()
         if given_up := quarantine(plan, self.ledger):
             raise IncompleteError(
                 f"{len(given_up)} blocks were given up after repeated failures, last with: "
@@ -156,12 +156,12 @@ class Arena:
         self._whole |= verified_artifacts(unseen, self.store, self.ledger, self.progress)
         if needed - self._whole:
             plan = replace(plans[0], recipes=recipes)
-            builds = Builds(plan, self.store, self.ledger, self.tally, self.progress)
+            builds = Builds(plan, self.store, self.ledger, self.executor, self.progress)
             builds.run(needed, self._whole & set(recipes))
             self._whole |= needed
 
     def close(self) -> None:
-        self.tally.close()
+        self.executor.close()
         self.shared.close()
 
 
