@@ -73,7 +73,15 @@ def wrong_settings(settings: Any, base: type) -> str:
         for one in fields(settings)
         if one.default is MISSING and one.default_factory is MISSING
     ]
-    return f"has no default for {lacking[0]!r}" if lacking else ""
+    if lacking:
+        return f"has no default for {lacking[0]!r}"
+    if not settings.__dataclass_params__.frozen:  # type: ignore[attr-defined]
+        return "is not frozen: write @dataclass(frozen=True)"
+    try:
+        settings()
+    except (TypeError, ValueError) as error:
+        return f"has a default that does not fit: {error}"
+    return ""
 
 
 def field_name(part: str) -> str:

@@ -1,4 +1,17 @@
-"""Algorithm 1 for a block of episodes, one skill at a time, from snapshot to snapshot."""
+"""Algorithm 1 for a block of episodes, one skill at a time, from snapshot to snapshot.
+
+    for each skill k of a task:                          `play_from_start`; `play_segment` plays one
+        while the stitch has steps left:                 `_stitch`
+            plan actions from s towards skill k          `Stitcher.propose` (MB-Stitch: Eq. 2)
+            execute them: s ← s'
+            stop where V_k(s') no longer rises           `_value`
+        while skill k is not accomplished:               `_execute`
+            execute π(a | s, k): s ← s'
+        stop where the steps of skill k are used up
+
+The first skill is stitched to where `first_stitch` says so. An episode that does not accomplish a
+skill goes no further.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +37,7 @@ class RolloutConfig(Bounded):
 
     temperature: NotNegative = 0.0  # of the policy: 0 its mode, as in IQL; 1 as learned
     skill_limit: Amount = 0  # most steps of one skill, its stitch included; 0: the task's own
-    stop_alpha: NotNegative = 0.0  # price of the values' disagreement when a stitch may stop
+    stop_alpha: NotNegative = 0.0  # as α of Eq. 2, where a real state's value decides to stop
     first_stitch: bool = False  # stitch before a task's first skill, too, as Algorithm 1 is printed
 
 
@@ -40,7 +53,7 @@ class Play:
     prefix: tuple[str, ...]  # skills up to and including the one being played
 
     def streams(self, purpose: str, *, by_method: bool = False) -> list[np.random.Generator]:
-        """One stream per episode. Only planners draw by method; the rest is common to all."""
+        """One stream per episode. Only stitchers draw by method; the rest is common to all."""
         method = (self.method,) if by_method else ()
         task = ">".join(self.prefix)
         return [
@@ -147,8 +160,9 @@ def _stitch(
     value_start: np.ndarray,
     value: Callable[[np.ndarray, int], np.ndarray],
 ) -> None:
-    """Stitching phase: until the stitcher wants no more, the next skill's value no longer rises
-    (where the stitcher's stitches end by it), or the limit."""
+    """Stitching phase: until the skill is achieved, the steps are used up, the stitcher's limit is
+    reached, the stitcher wants no more, or, where `until_value_falls`, the value after a whole
+    proposal is no higher than after the one before."""
     streams = play.streams("planner", by_method=True)
     values = value_start.copy()
     rows = progress.open(np.arange(len(values)))
@@ -205,7 +219,7 @@ def policy_noise(actions: ActionSpace, streams: Sequence[np.random.Generator]) -
 def _value(
     agent: Agent, alpha: float, block: EpisodeBlock, rows: np.ndarray, skill: int
 ) -> np.ndarray:
-    """E[V] − α·Var(V) of real states, (n,) float32: what the stop rule watches."""
+    """E[V] − stop_alpha · Var(V) of real states, (n,) float32: what the stop rule watches."""
     if not len(rows):
         return np.zeros(0, dtype=np.float32)
     values = agent.values(torch.from_numpy(block.observe(rows)), skill)

@@ -44,7 +44,7 @@ class TableSpec:
 
     id: str
     paper: str  # the number of the paper's table it stands beside
-    rows: str = "length"  # how tasks are grouped into rows: length, last_skill, task
+    rows: str = "length"  # how tasks are grouped: length, last_skill, task; variant in a suite
     title: str = ""
     noun: str = "skills"  # what a row label counts
     baseline: str = ""  # gains of all others over this method; default: of the last over all others
@@ -133,7 +133,10 @@ class Spec(MethodSections):
 
 for _name in METHODS:
     if field_name(_name) in {*Spec.__annotations__, *vars(Bounded), *vars(Spec)}:
-        raise PartError(f"method {_name!r}: specs have another field or property so called")
+        raise PartError(
+            f"method {_name!r}, of {METHODS[_name].settings.__module__}: specs have another field "
+            "or property so called"
+        )
 
 
 def check_spec(spec: Spec) -> None:
@@ -149,6 +152,10 @@ def check_spec(spec: Spec) -> None:
     ids = [table.id for table in spec.tables]
     for table in spec.tables:
         check_rows(table, f"{where}, table {table.id}")
+        if table.rows == "variant":
+            raise UsageError(
+                f"{where}, table {table.id}: rows 'variant' need [[parts]], for a part is a row"
+            )
         if ids.count(table.id) > 1:
             raise UsageError(f"{where}: two tables have the id {table.id!r}")
         if table.baseline and table.baseline not in spec.methods:

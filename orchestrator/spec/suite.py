@@ -118,7 +118,7 @@ def _check_table(suite: Suite, table: TableSpec, where: str) -> None:
         )
     if table.baseline and not any(table.baseline in part.spec.methods for part in suite.parts):
         raise UsageError(f"{where}: the baseline {table.baseline!r} is no part's method")
-    if table.rows == "task":
+    if table.rows != "variant":
         rows = Counter(
             " → ".join(map(suite.skill_label, task))
             for part in suite.parts
@@ -126,7 +126,7 @@ def _check_table(suite: Suite, table: TableSpec, where: str) -> None:
         )
         if twice := [row for row, parts in rows.items() if parts > 1]:
             raise UsageError(
-                f"{where}: two parts play {twice[0]!r}, which would be one row; use "
+                f"{where}: two parts play {twice[0]!r}, which would be counted as one; use "
                 'rows = "variant", where a part is a row'
             )
 
@@ -148,6 +148,12 @@ def load_asked(name_or_file: str, scale: Scale = "paper") -> Spec | Suite:
         structure(PartFields, entry, f"{where}, parts[{i}]")
         for i, entry in enumerate(content["parts"])
     ]
+    for number, entry in enumerate(entries):
+        check_names([entry.label], f"{where}, parts[{number}], label")
+        if not entry.base and "benchmark" not in {**content, **entry.settings}:
+            raise UsageError(
+                f"{where}, part {entry.label}: neither base nor benchmark; name a spec as its base"
+            )
     parts = tuple(
         Part(entry.label, _part_spec(entry, content, scale, folder, where)) for entry in entries
     )

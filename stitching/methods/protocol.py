@@ -83,6 +83,7 @@ class Stitcher(Protocol):
         """Actions to execute before the value is looked at again.
 
         For states (n, observation), with one stream each. previous: None before a first skill.
+        Steps beyond `limit` are dropped. A stitcher keeps nothing from call to call.
         """
 
 

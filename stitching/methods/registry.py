@@ -11,7 +11,7 @@ from stitching.methods.protocol import Method, MethodSettings
 from stitching.methods.random_stitch import RANDOM_STITCH
 from stitching.methods.reach_stitch import REACH_STITCH
 from stitching.methods.single_policy import SINGLE_POLICY
-from stitching.registry import with_installed, wrong_settings
+from stitching.registry import PartError, with_installed, wrong_settings
 
 
 def _wrong(part: Any) -> str:
@@ -22,7 +22,12 @@ def _wrong(part: Any) -> str:
         return f"has settings that cannot be used: {part.settings.__name__} {wrong}"
     asked = ("before_first", "until_value_falls", "limit", "propose")
     lacking = [name for name in asked if not hasattr(part.stitcher, name)]
-    return f"has a stitcher without {lacking[0]!r}" if lacking else ""
+    if lacking:
+        return (
+            f"has a stitcher whose class has no {lacking[0]!r}: a property or class attribute, for "
+            "setting it in __init__ is not enough"
+        )
+    return ""
 
 
 METHODS: dict[str, Method] = with_installed(
@@ -37,3 +42,8 @@ METHODS: dict[str, Method] = with_installed(
     },
     _wrong,
 )
+
+for _name, _method in METHODS.items():
+    _alike = [name for name, method in METHODS.items() if method.label == _method.label]
+    if len(_alike) > 1:
+        raise PartError(f"{' and '.join(_alike)} have the same label, {_method.label!r}")

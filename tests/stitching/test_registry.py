@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from stitching.bounds import Bounded
+from stitching.bounds import Bounded, Count
 from stitching.planning.registry import PlannerChoice
 from stitching.registry import PartError, field_name, sections, with_installed, wrong_settings
 
@@ -72,6 +72,16 @@ class Incomplete(Bounded):
     size: int
 
 
+@dataclass(frozen=True)
+class Wrong(Bounded):
+    size: Count = -1
+
+
+@dataclass
+class Loose(Bounded):
+    size: int = 1
+
+
 @pytest.mark.parametrize(
     ("settings", "problem"),
     [
@@ -79,6 +89,8 @@ class Incomplete(Bounded):
         (Complete(), "is no dataclass"),
         (int, "is no dataclass"),
         (Incomplete, "has no default for 'size'"),
+        (Wrong, "has a default that does not fit: size: must be at least 1: -1"),
+        (Loose, "is not frozen: write @dataclass(frozen=True)"),
     ],
 )
 def test_settings_are_a_dataclass_with_defaults(settings: object, problem: str) -> None:

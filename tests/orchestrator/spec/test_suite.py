@@ -12,6 +12,7 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.errors import ChangedError, IncompleteError, LockedError, UsageError
+from orchestrator.spec.spec import TableSpec
 from orchestrator.spec.structure import to_plain
 from orchestrator.spec.suite import Suite, load_asked, part_directory
 from orchestrator.storage.merge import (
@@ -275,8 +276,33 @@ def test_refusals(done: Path) -> None:
         replace(
             suite, parts=(suite.parts[0], replace(changed, spec=replace(changed.spec, seeds=2)))
         )
-    with pytest.raises(UsageError, match="would be one row"):
-        replace(suite, tables=(replace(suite.tables[0], rows="task"),))
+    for rows in ("task", "length"):
+        with pytest.raises(UsageError, match="would be counted as one"):
+            replace(suite, tables=(replace(suite.tables[0], rows=rows),))
+
+
+@pytest.mark.parametrize(
+    ("label", "base", "message"),
+    [
+        ("low noise", 'base = "table1"', r"parts\[0\], label: 'low noise' is no name"),
+        ("low", "", "part low: neither base nor benchmark; name a spec as its base"),
+    ],
+)
+def test_a_part_that_is_not_said_well(tmp_path: Path, label: str, base: str, message: str) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        f'name = "mine"\ntitle = "Mine"\n[[parts]]\nlabel = "{label}"\n{base}\n'
+        '[[tables]]\nid = "mine"\npaper = ""\nrows = "variant"\n'
+    )
+    with pytest.raises(UsageError, match=message):
+        load_asked(str(path), "smoke")
+
+
+def test_a_run_has_no_variants() -> None:
+    spec = levels().parts[0].spec
+    table = TableSpec("mine", "", rows="variant")
+    with pytest.raises(UsageError, match=r"rows 'variant' need \[\[parts\]\]"):
+        replace(spec, tables=(table,))
 
 
 def test_the_other_commands(done: Path, capsys: pytest.CaptureFixture[str]) -> None:
