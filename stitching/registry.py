@@ -84,6 +84,11 @@ def wrong_settings(settings: Any, base: type) -> str:
     return ""
 
 
+def is_ours(part: type) -> bool:
+    """Whether a class is this package's."""
+    return part.__module__.partition(".")[0] == __name__.partition(".")[0]
+
+
 def field_name(part: str) -> str:
     """What settings of a part are called in files: those of "mb-stitch" are "mb_stitch"."""
     return part.replace("-", "_")

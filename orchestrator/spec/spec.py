@@ -22,9 +22,16 @@ from orchestrator.spec.methods import (
     parse_method,
     settings_with_effect,
 )
-from orchestrator.spec.structure import Plain, merged, nested, settings_of, structure, to_plain
+from orchestrator.spec.structure import (
+    Plain,
+    merged,
+    nested,
+    plain_differences,
+    settings_of,
+    structure,
+    to_plain,
+)
 from orchestrator.spec.tomls import PACKAGED, Scale, based_fields, read_toml
-from orchestrator.work.recipes import OUR_PACKAGE
 from stitching.bounds import Bounded, Count, Episodes, Few, Seed
 from stitching.methods.no_stitch import NO_STITCH
 from stitching.methods.protocol import MethodSettings
@@ -32,7 +39,7 @@ from stitching.methods.registry import METHODS
 from stitching.models.dynamics import DynamicsConfig
 from stitching.models.iql import IQLConfig
 from stitching.planning.registry import PLANNERS, PlannerChoice
-from stitching.registry import PartError, field_name, sections
+from stitching.registry import PartError, field_name, is_ours, sections
 from stitching.rollout import RolloutConfig
 
 NAME = re.compile(r"[A-Za-z0-9][\w.-]*")  # becomes part of paths
@@ -271,11 +278,11 @@ def plain_spec(spec: Spec) -> Plain:
     plain: Plain = to_plain(spec)
     used = {method_name(method) for method in spec.methods}
     for name in METHODS.keys() - used:
-        if not _is_ours(METHODS[name].settings):
+        if not is_ours(METHODS[name].settings):
             plain.pop(field_name(name), None)
     every = (spec.method_settings(method) for method in spec.methods)
     chosen = {one.planner for one in every if isinstance(one, PlannerChoice)}
-    unused = [name for name in PLANNERS.keys() - chosen if not _is_ours(PLANNERS[name])]
+    unused = [name for name in PLANNERS.keys() - chosen if not is_ours(PLANNERS[name])]
     planning = [one for one in plain.values() if isinstance(one, dict) and "planner" in one]
     for section in planning:
         for name in unused:
@@ -284,22 +291,6 @@ def plain_spec(spec: Spec) -> Plain:
     return plain
 
 
-def _is_ours(part: type) -> bool:
-    return part.__module__.partition(".")[0] == OUR_PACKAGE
-
-
 def differences(old: Spec, new: Spec) -> list[str]:
     """Human-readable list of the fields in which two specs differ."""
     return plain_differences(to_plain(old), to_plain(new))
-
-
-def plain_differences(old: Any, new: Any, path: str = "") -> list[str]:
-    """A line for each field in which two plain values differ."""
-    if isinstance(old, dict) and isinstance(new, dict):
-        keys = sorted(old.keys() | new.keys(), key=str)
-        return [
-            line
-            for key in keys
-            for line in plain_differences(old.get(key), new.get(key), f"{path}.{key}".lstrip("."))
-        ]
-    return [] if old == new else [f"{path}: {old!r} → {new!r}"]

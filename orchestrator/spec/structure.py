@@ -121,3 +121,15 @@ def nested(flat: Plain) -> Plain:
             value = {name: value}
         tables = merged(tables, value)
     return tables
+
+
+def plain_differences(old: Any, new: Any, path: str = "") -> list[str]:
+    """A line for each field in which two plain values differ."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        keys = sorted(old.keys() | new.keys(), key=str)
+        return [
+            line
+            for key in keys
+            for line in plain_differences(old.get(key), new.get(key), f"{path}.{key}".lstrip("."))
+        ]
+    return [] if old == new else [f"{path}: {old!r} → {new!r}"]

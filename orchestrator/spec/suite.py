@@ -15,10 +15,9 @@ from orchestrator.spec.spec import (
     check_names,
     check_rows,
     differences,
-    plain_differences,
     spec_from_plain,
 )
-from orchestrator.spec.structure import Plain, merged, structure, to_plain
+from orchestrator.spec.structure import Plain, merged, plain_differences, structure, to_plain
 from orchestrator.spec.tomls import PACKAGED, Scale, based_fields, check_scales, read_toml
 from orchestrator.storage.rundir import RunDirectory
 
