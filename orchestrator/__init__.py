@@ -70,13 +70,11 @@ def reproduce(
     """
     from pathlib import Path
 
-    from orchestrator.spec.suite import Suite
     from orchestrator.storage.rundir import default_out
     from orchestrator.storage.store import USUAL_STORE
     from orchestrator.work.progress import Silent
     from orchestrator.work.reproduce import Settings
-    from orchestrator.work.reproduce import reproduce as reproduce_spec
-    from orchestrator.work.reproduce_suite import reproduce_suite
+    from orchestrator.work.reproduce_suite import reproduce_asked
 
     settings = Settings(
         Path(out) if out is not None else default_out(spec),
@@ -86,6 +84,4 @@ def reproduce(
         address,
         tracking_uri,
     )
-    if isinstance(spec, Suite):
-        return reproduce_suite(spec, settings, Silent()).path
-    return reproduce_spec(spec, settings, Silent()).path
+    return reproduce_asked(spec, settings, Silent()).path

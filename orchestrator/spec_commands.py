@@ -114,8 +114,8 @@ def run(words: list[str], output: Console, errors: Console) -> None:
     from orchestrator.printing import summary_lines
     from orchestrator.storage.rundir import RunDirectory, default_out
     from orchestrator.work.progress import ConsoleProgress
-    from orchestrator.work.reproduce import Settings, reproduce
-    from orchestrator.work.reproduce_suite import reproduce_suite
+    from orchestrator.work.reproduce import Settings
+    from orchestrator.work.reproduce_suite import reproduce_asked
 
     command, asked = _with_spec(RunCommand, "run", words)
     out = command.out or default_out(asked)
@@ -136,10 +136,7 @@ def run(words: list[str], output: Console, errors: Console) -> None:
     incomplete = None
     with ConsoleProgress(errors) as progress:
         try:
-            if isinstance(asked, Suite):
-                reproduce_suite(asked, settings, progress)
-            else:
-                reproduce(asked, settings, progress)
+            reproduce_asked(asked, settings, progress)
         except IncompleteError as error:
             if not (out / "finished").is_file():
                 raise

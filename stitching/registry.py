@@ -68,13 +68,9 @@ def wrong_settings(settings: Any, base: type) -> str:
         return "is no dataclass"
     if not issubclass(settings, base):
         return f"does not inherit from {base.__name__}"
-    lacking = [
-        one.name
-        for one in fields(settings)
-        if one.default is MISSING and one.default_factory is MISSING
-    ]
-    if lacking:
-        return f"has no default for {lacking[0]!r}"
+    for one in fields(settings):
+        if one.default is MISSING and one.default_factory is MISSING:
+            return f"has no default for {one.name!r}"
     if not settings.__dataclass_params__.frozen:  # type: ignore[attr-defined]
         return "is not frozen: write @dataclass(frozen=True)"
     try:
@@ -82,6 +78,11 @@ def wrong_settings(settings: Any, base: type) -> str:
     except (TypeError, ValueError) as error:
         return f"has a default that does not fit: {error}"
     return ""
+
+
+def lacking(owner: Any, asked: tuple[str, ...]) -> str:
+    """The first of some attributes that it has not; empty where it has all."""
+    return next((name for name in asked if not hasattr(owner, name)), "")
 
 
 def is_ours(part: type) -> bool:

@@ -15,8 +15,8 @@ KITS: dict[str, Kit] = with_installed(
     lambda part: "" if isinstance(part, Kit) else "is no Kit",
 )
 
-for name, kit in KITS.items():
-    if kit.benchmark.name != name:
-        raise PartError(f"the benchmark {kit.benchmark.name!r} is registered as {name!r}")
+for _name, _kit in KITS.items():
+    if _kit.benchmark.name != _name:
+        raise PartError(f"the benchmark {_kit.benchmark.name!r} is registered as {_name!r}")
 
 BENCHMARKS: dict[str, Benchmark] = {name: kit.benchmark for name, kit in KITS.items()}

@@ -18,7 +18,7 @@ from stitching.methods.mb_stitch import MB_STITCH
 from stitching.methods.mf_stitch import MFStitchSettings
 from stitching.methods.no_stitch import NO_STITCH
 from stitching.methods.planning import PlanningSettings
-from stitching.methods.protocol import Method, MethodSettings
+from stitching.methods.protocol import MethodSettings
 from stitching.methods.single_policy import SinglePolicySettings
 
 S = TypeVar("S", bound=MethodSettings)
@@ -60,17 +60,18 @@ class Recipes:
 
     def add_illustrations(self) -> None:
         """What is looked at of MB-Stitch, with seed 0's models; of several, the first one's."""
-        ours = _settings(self.spec, MB_STITCH)[:1]
-        if not ours:
+        ours = next((one for one in self.spec.methods if method_of(one) is MB_STITCH), None)
+        if ours is None:
             return
         kit, data = KITS[self.spec.benchmark], {"config": to_plain(self.spec.data)}
         extras = {role: self.add(kind, data | self.root) for role, kind in kit.extras.items()}
-        models = {kind: self.models[kind, 0, ours[0][0]] for kind in MB_STITCH.models}
+        models = {kind: self.models[kind, 0, ours] for kind in MB_STITCH.models}
         there = models | self.datasets | extras
         for name, one in kit.illustrations.items():
             roles = [self.demonstrations if role == TEACHING else (role,) for role in one.inputs]
             inputs = {role: there[role] for role in chain.from_iterable(roles)}
-            self.illustrations[name] = self.add(one.kind, _illustrated(self.spec, one), inputs)
+            params = _illustrated(self.spec, one, ours)
+            self.illustrations[name] = self.add(one.kind, params, inputs)
 
     @property
     def demonstrations(self) -> dict[str, str]:
@@ -153,45 +154,35 @@ MODELS: dict[str, Callable[[Recipes, int, str], str]] = {
 """How the recipe of a kind of model is made, for a seed and the method that asks for it."""
 
 
-def _illustrated(spec: Spec, illustration: Illustration) -> Plain:
-    """Parameters of an illustration; one that plays a task does so by No- and MB-Stitch.
+def _illustrated(spec: Spec, illustration: Illustration, ours: str) -> Plain:
+    """Parameters of an illustration; one that plays a task does so by No-Stitch and `ours`.
 
-    Of several MB-Stitches, the first. One that takes stitches apart knows what No-Stitch is.
+    ours: an MB-Stitch. What takes stitches apart knows what No-Stitch is.
     """
+    settings = spec.method_settings(ours)
+    assert isinstance(settings, PlanningSettings)
     params: Plain = {
         "rollout": to_plain(spec.rollout),
         "step_limit": spec.step_limit,
         "root_seed": spec.root_seed,
         "seed": 0,
+        "code": code_fingerprint(tuple(sorted(playing_modules(ours, settings)))),
     }
-    ours = _settings(spec, MB_STITCH)[:1]
-    planner = spec.method_settings(ours[0][0])
-    assert isinstance(planner, PlanningSettings)
-    modules = tuple(sorted(playing_modules(ours[0][0], planner)))
-    params["code"] = code_fingerprint(modules)  # of the planner, too
+    played = [(ours, settings_with_effect(settings))]
     if illustration.pairs:
         return params | {
-            "methods": ours,
+            "methods": played,
             "pairs": _spread_out(_neighbours(spec), illustration.pairs),
             "episodes": min(illustration.episodes, spec.episodes),
         }
     task = illustration.task
     if not task:
-        return params | {"horizon": planner.chosen.horizon}
+        return params | {"horizon": settings.chosen.horizon}
     return params | {
         # Whatever their order in the spec.
-        "methods": _settings(spec, NO_STITCH) + ours,
+        "methods": [(one, {}) for one in spec.methods if method_of(one) is NO_STITCH] + played,
         "task": task if task in spec.all_tasks else max(spec.all_tasks, key=len),
     }
-
-
-def _settings(spec: Spec, kind: Method) -> list[tuple[str, Plain]]:
-    """The spec's methods of a kind, each with its settings."""
-    return [
-        (method, settings_with_effect(spec.method_settings(method)))
-        for method in spec.methods
-        if method_of(method) is kind
-    ]
 
 
 def _neighbours(spec: Spec) -> list[tuple[str, ...]]:

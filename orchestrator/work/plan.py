@@ -45,6 +45,7 @@ class MethodBlocks:
     name: str  # of the method without its settings; SHARED likewise
     settings: MethodSettings
     rollout: RolloutConfig
+    models: tuple[str, ...]  # kinds of those that they are played with
     code: str  # fingerprint of what plays them
 
     @classmethod
@@ -56,6 +57,7 @@ class MethodBlocks:
             method_name(method) if method != SHARED else SHARED,
             settings,
             method_rollout(method, spec.rollout),
+            method_of(method).models,
             code_fingerprint(
                 tuple(sorted({*BLOCK_CODE, *playing_modules(method, settings)})), BLOCK_SETUP
             ),
@@ -139,10 +141,7 @@ class Plan:
             "prefix": node.prefix,
             "episodes": episodes,
             "step_limit": self.spec.step_limit,
-            "artifacts": {
-                kind: self.models[kind, node.seed, node.method]
-                for kind in method_of(node.method).models
-            },
+            "artifacts": {kind: self.models[kind, node.seed, node.method] for kind in alike.models},
         }
         key = digest(place | alike.named)
         return BlockTask(key=key, settings=alike.settings, rollout=alike.rollout, **place)

@@ -71,7 +71,7 @@ def code_fingerprint(modules: tuple[str, ...], beside: tuple[str, ...] = ()) -> 
     needed = _closure((*names, *others.asks_for))
     return digest(
         {
-            "modules": {name: _syntax(_tree(name)) for name in sorted(needed | set(beside))},
+            "modules": {name: _code(name).syntax for name in sorted(needed | set(beside))},
             "packages": {name: importlib.metadata.version(name) for name in NUMERIC_PACKAGES},
             "other packages": others.content,
         }
@@ -100,12 +100,12 @@ class _Distribution:
         content = {name: importlib.metadata.version(name) for name in sorted(names)}
         asks_for: set[str] = set()
         for name, file in sorted(found for package in packages for found in _files_of(package)):
-            data = file.read_bytes()
-            content[name] = hashlib.sha256(data).hexdigest()
             if file.suffix == ".py":
-                tree = ast.parse(data)
-                content[name] = _syntax(tree)
-                asks_for |= _named_imports(tree)
+                code = _Code.of(file)
+                content[name] = code.syntax
+                asks_for |= code.imports
+            else:
+                content[name] = hashlib.sha256(file.read_bytes()).hexdigest()
         return cls(content, tuple(sorted(asks_for)))
 
 
@@ -130,16 +130,29 @@ def _closure(modules: tuple[str, ...]) -> set[str]:
         name = waiting.pop()
         if name not in seen and name not in NOT_FOLLOWED:
             seen.add(name)
-            waiting.extend(_named_imports(_tree(name)))
+            waiting.extend(_code(name).imports)
     return seen
 
 
+@dataclass(frozen=True)
+class _Code:
+    """What fingerprints ask of a module; many share one."""
+
+    syntax: str  # hash of its syntax tree without docstrings
+    imports: frozenset[str]  # modules of ours
+
+    @classmethod
+    def of(cls, file: Path) -> _Code:
+        tree = ast.parse(file.read_bytes())
+        return cls(_syntax(tree), frozenset(_named_imports(tree)))
+
+
 @cache
-def _tree(module: str) -> ast.Module:
+def _code(module: str) -> _Code:
     spec = importlib.util.find_spec(module)
     if spec is None or spec.origin is None:
         raise ModuleNotFoundError(module)
-    return ast.parse(Path(spec.origin).read_text())
+    return _Code.of(Path(spec.origin))
 
 
 def _named_imports(tree: ast.Module) -> set[str]:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from analysis.report import build_report
 from orchestrator.errors import IncompleteError, SkillstitchError
 from orchestrator.executors import open_executor
+from orchestrator.spec.spec import Spec
 from orchestrator.spec.suite import Suite, part_directory, suite_differences, suite_of
 from orchestrator.storage import locking
 from orchestrator.storage.merge import describe_suite, write_merged
@@ -18,6 +19,13 @@ from orchestrator.work.plan import make_plan
 from orchestrator.work.progress import Progress
 from orchestrator.work.reproduce import Settings, partial_error, reproduce, tracked
 from orchestrator.work.stopwatch import Stopwatch
+
+
+def reproduce_asked(asked: Spec | Suite, settings: Settings, progress: Progress) -> RunDirectory:
+    """Carry out a spec or a suite, as `reproduce` and `reproduce_suite` do."""
+    if isinstance(asked, Suite):
+        return reproduce_suite(asked, settings, progress)
+    return reproduce(asked, settings, progress)
 
 
 def reproduce_suite(suite: Suite, settings: Settings, progress: Progress) -> RunDirectory:

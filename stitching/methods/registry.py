@@ -11,7 +11,7 @@ from stitching.methods.protocol import Method, MethodSettings
 from stitching.methods.random_stitch import RANDOM_STITCH
 from stitching.methods.reach_stitch import REACH_STITCH
 from stitching.methods.single_policy import SINGLE_POLICY
-from stitching.registry import PartError, with_installed, wrong_settings
+from stitching.registry import PartError, lacking, with_installed, wrong_settings
 
 
 def _wrong(part: Any) -> str:
@@ -21,10 +21,9 @@ def _wrong(part: Any) -> str:
     if wrong := wrong_settings(part.settings, MethodSettings):
         return f"has settings that cannot be used: {part.settings.__name__} {wrong}"
     asked = ("before_first", "until_value_falls", "limit", "propose")
-    lacking = [name for name in asked if not hasattr(part.stitcher, name)]
-    if lacking:
+    if missing := lacking(part.stitcher, asked):
         return (
-            f"has a stitcher whose class has no {lacking[0]!r}: a property or class attribute, for "
+            f"has a stitcher whose class has no {missing!r}: a property or class attribute, for "
             "setting it in __init__ is not enough"
         )
     return ""

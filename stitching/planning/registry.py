@@ -12,6 +12,7 @@ from stitching.planning.random_shooting import RandomShooting
 from stitching.registry import (
     PartError,
     field_name,
+    lacking,
     sections,
     with_installed,
     wrong_settings,
@@ -22,9 +23,8 @@ def _wrong(part: Any) -> str:
     """What keeps a part from being a planner, in words; empty where nothing does."""
     if wrong := wrong_settings(part, Bounded):
         return wrong
-    asked = ("plan", "can_search", "horizon", "samples")
-    lacking = [name for name in asked if not hasattr(part(), name)]
-    return f"has no {lacking[0]!r}" if lacking else ""
+    missing = lacking(part(), ("plan", "can_search", "horizon", "samples"))
+    return f"has no {missing!r}" if missing else ""
 
 
 PLANNERS: dict[str, type[Planner]] = with_installed(

@@ -15,7 +15,7 @@ from orchestrator.work.recipes import Recipe, canonical, code_fingerprint, diges
 def clear() -> None:
     importlib.invalidate_caches()
     code_fingerprint.cache_clear()
-    recipes._tree.cache_clear()
+    recipes._code.cache_clear()
 
 
 Write = Callable[[str, str], None]
