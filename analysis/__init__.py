@@ -21,7 +21,7 @@ __all__ = ["open_run"]
 def open_run(directory: str | PathLike[str]) -> OpenedRun:
     """What a run directory holds, as pandas tables.
 
-    Raises RunError (`analysis.run`) where it is none, or nothing has been played in it.
+    Raises RunError (`analysis.schema`) where it is none, or nothing has been played in it.
     """
     from pathlib import Path
 

@@ -6,10 +6,11 @@ from pathlib import Path
 import pandas as pd
 
 from analysis.episodes import episodes_from_segments
-from analysis.rows import place_tasks
-from analysis.run import RunError, RunSpec, load_run, load_run_spec
+from analysis.run import load_run, load_run_spec
+from analysis.schema import RunError, RunSpec
 from analysis.statistics import generator, paired_gain
-from analysis.writers import BOOTSTRAP, seed_note
+from analysis.tables.rows import place_tasks
+from analysis.tables.writers import BOOTSTRAP, seed_note
 
 COLUMNS = [
     "table", "row", "method", "score_a", "score_b", "b_minus_a", "ci_low", "ci_high",

@@ -13,7 +13,8 @@ import numpy as np
 import pandas as pd
 
 from analysis.files import replaced_file
-from analysis.run import SEPARATOR, RunError, RunSpec, load_run, task_length
+from analysis.run import load_run
+from analysis.schema import SEPARATOR, RunError, RunSpec, task_length
 
 COLUMNS = ["seed", "method", "task", "length", "episode", "accomplished", "score", "steps"]
 ABSENT, FAILED, SUCCEEDED = -1, 0, 1

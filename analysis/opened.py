@@ -8,8 +8,9 @@ from functools import cached_property
 import pandas as pd
 
 from analysis.episodes import episodes_from_segments
-from analysis.run import Run, RunError
-from analysis.tables import Table, build_table
+from analysis.run import Run
+from analysis.schema import RunError
+from analysis.tables.table import Table, build_table
 
 
 @dataclass(frozen=True)

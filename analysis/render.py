@@ -2,7 +2,7 @@
 
 A process of its own, because MuJoCo reads MUJOCO_GL when it is imported. It is the only module
 here that loads the simulator, no other imports it, and it simulates nothing. What a scene is, is
-told by `analysis.figures.scenes`.
+told by `analysis.figures.showcase.scenes`.
 """
 
 import json

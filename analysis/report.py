@@ -6,22 +6,22 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis.anatomy import anatomy_table, stitch_table
 from analysis.episodes import write_episodes
 from analysis.figures import Drawn, draw_figures
 from analysis.files import replaced_folder
-from analysis.forecast import forecast_table
-from analysis.models import model_table
-from analysis.page import render_page
-from analysis.pairs import both_skills, pair_groups, pair_table, second_skills, shown_orders
-from analysis.profile import profiles
-from analysis.profile_text import profile_markdown
-from analysis.rates import HEADER, NOTE, rate_lines, rate_table
+from analysis.page.page import render_page
+from analysis.page.profile import profile_markdown
+from analysis.paper.profile import profiles
 from analysis.results import check_results, provenance_text
 from analysis.run import Run, load_run
-from analysis.skills import permutation_scores
-from analysis.tables import Table, build_table
-from analysis.writers import markdown_table, to_csv, to_latex, to_markdown
+from analysis.studies.forecast import forecast_table
+from analysis.studies.models import model_table
+from analysis.studies.pairs import both_skills, pair_groups, pair_table, second_skills, shown_orders
+from analysis.studies.rates import HEADER, NOTE, rate_lines, rate_table
+from analysis.studies.stitches import anatomy_table, stitch_table
+from analysis.tables.skills import permutation_scores
+from analysis.tables.table import Table, build_table
+from analysis.tables.writers import markdown_table, to_csv, to_latex, to_markdown
 
 Studies = dict[str, pd.DataFrame]
 

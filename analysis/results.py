@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from analysis.run import RunError
+from analysis.schema import RunError
 
 SCALES = ("smoke", "quick", "standard", "paper")  # from the smallest
 Extent = dict[str, str | int]

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import norm
 
-from analysis.run import SEPARATOR
+from analysis.schema import SEPARATOR
 
 RESAMPLES = 1000
 CONFIDENCE = 0.95

@@ -70,11 +70,11 @@ def reproduce(
     """
     from pathlib import Path
 
+    from orchestrator.reproduce import Settings
+    from orchestrator.reproduce_suite import reproduce_asked
     from orchestrator.storage.rundir import default_out
     from orchestrator.storage.store import USUAL_STORE
     from orchestrator.work.progress import Silent
-    from orchestrator.work.reproduce import Settings
-    from orchestrator.work.reproduce_suite import reproduce_asked
 
     settings = Settings(
         Path(out) if out is not None else default_out(spec),

@@ -93,9 +93,9 @@ def _sweep(words: list[str]) -> None:
 
 def _status(words: list[str]) -> None:
     from orchestrator.printing import status_lines, suite_status_lines
+    from orchestrator.reproduce import catch_up
     from orchestrator.spec.suite import is_suite, part_directories
     from orchestrator.storage.rundir import RunDirectory
-    from orchestrator.work.reproduce import catch_up
 
     def status(run: tyro.conf.Positional[Path], store: Path | None = None) -> None:
         """How far a run directory is.
@@ -132,11 +132,11 @@ def _list(words: list[str]) -> None:
 
 def _report(words: list[str]) -> None:
     from analysis.report import build_report
+    from orchestrator.reproduce import catch_up
     from orchestrator.spec.suite import is_suite
     from orchestrator.spec_commands import export
     from orchestrator.storage.merge import merge_again
     from orchestrator.storage.rundir import RunDirectory
-    from orchestrator.work.reproduce import catch_up
 
     def report(
         run: tyro.conf.Positional[Path], results: Path | None = None, force: bool = False

@@ -55,7 +55,7 @@ class BadDataError(SkillstitchError):
 @contextmanager
 def said_to_users() -> Iterator[None]:
     """The analysis refuses with ValueErrors of its own, written for users."""
-    from analysis.run import RunError
+    from analysis.schema import RunError
 
     try:
         yield

@@ -91,11 +91,11 @@ def _option(words: list[str], name: str) -> str:
 def plan(words: list[str], output: Console) -> None:
     """`skillstitch plan SPEC [options]`."""
     from orchestrator.printing import forecast_lines, plan_lines, suite_plan_lines
+    from orchestrator.reproduce import check_workers
     from orchestrator.storage.ledger import Ledger
     from orchestrator.storage.store import Store
     from orchestrator.work.costs import estimate
     from orchestrator.work.plan import make_plan
-    from orchestrator.work.reproduce import check_workers
 
     command, asked = _with_spec(PlanCommand, "plan", words)
     check_workers(command.workers)
@@ -112,10 +112,10 @@ def plan(words: list[str], output: Console) -> None:
 def run(words: list[str], output: Console, errors: Console) -> None:
     """`skillstitch run SPEC [options]`."""
     from orchestrator.printing import summary_lines
+    from orchestrator.reproduce import Settings
+    from orchestrator.reproduce_suite import reproduce_asked
     from orchestrator.storage.rundir import RunDirectory, default_out
     from orchestrator.work.progress import ConsoleProgress
-    from orchestrator.work.reproduce import Settings
-    from orchestrator.work.reproduce_suite import reproduce_asked
 
     command, asked = _with_spec(RunCommand, "run", words)
     out = command.out or default_out(asked)

@@ -24,7 +24,7 @@ import numpy as np
 import torch
 
 from stitching.bounds import Amount, Bounded, NotNegative
-from stitching.envs.protocol import ActionSpace, Benchmark, EpisodeBlock
+from stitching.envs.protocol import ActionSpace, Benchmark, VectorEnv
 from stitching.methods.protocol import Stitcher
 from stitching.models.agent import Agent
 from stitching.planning.objective import spread_over_members
@@ -42,8 +42,8 @@ class RolloutConfig(Bounded):
 
 
 @dataclass(frozen=True)
-class Play:
-    """Which episodes a segment belongs to; names every stream of randomness it draws from."""
+class Block:
+    """Episodes of one node, played together; names every stream of randomness they draw from."""
 
     root_seed: int
     benchmark: str
@@ -78,7 +78,7 @@ class Recorder(Protocol):
     """Is told of every step, for pictures and studies; changes nothing."""
 
     def step(
-        self, block: EpisodeBlock, rows: np.ndarray, episodes: np.ndarray, skill: int, phase: str
+        self, env: VectorEnv, rows: np.ndarray, episodes: np.ndarray, skill: int, phase: str
     ) -> None: ...
 
 
@@ -86,7 +86,7 @@ class Recorder(Protocol):
 class _Progress:
     """The moving parts of a segment."""
 
-    block: EpisodeBlock
+    env: VectorEnv
     skill: int
     episodes: np.ndarray  # (n,) their numbers
     budget: np.ndarray  # (n,) steps each may still take
@@ -97,65 +97,65 @@ class _Progress:
     def __post_init__(self) -> None:
         rows = np.arange(len(self.budget))
         self.steps = np.zeros(len(rows), dtype=np.int64)
-        self.success = self.block.achieved(rows, self.skill)
+        self.success = self.env.achieved(rows, self.skill)
 
     def open(self, rows: np.ndarray) -> np.ndarray:
         """Those of the rows that have neither achieved the skill nor used up their budget."""
         return rows[~self.success[rows] & (self.steps[rows] < self.budget[rows])]
 
     def step(self, rows: np.ndarray, actions: np.ndarray, phase: str) -> None:
-        self.block.step(rows, actions)
+        self.env.step(rows, actions)
         self.steps[rows] += 1
-        self.success[rows] = self.block.achieved(rows, self.skill)
+        self.success[rows] = self.env.achieved(rows, self.skill)
         if self.recorder is not None:
-            self.recorder.step(self.block, rows, self.episodes[rows], self.skill, phase)
+            self.recorder.step(self.env, rows, self.episodes[rows], self.skill, phase)
 
 
 @torch.inference_mode()
 def play_segment(
-    block: EpisodeBlock,
+    env: VectorEnv,
     agent: Agent,
     stitcher: Stitcher,
     benchmark: Benchmark,
     config: RolloutConfig,
-    play: Play,
+    block: Block,
     budget: np.ndarray,
     recorder: Recorder | None = None,
 ) -> Segments:
     """Stitch to the last skill of `play.prefix` and execute it, for all episodes together.
 
-    The block stands at a skill boundary. A skill counts as accomplished at the first step at which
+    The environment stands at a skill boundary. A skill counts as accomplished at the first step at which
     its goal holds, stitching steps included. budget (n,) int64: steps left in each episode.
     """
     names = [skill.name for skill in benchmark.skills]
-    skill = names.index(play.prefix[-1])
-    rows = np.arange(len(play.episodes))
+    skill = names.index(block.prefix[-1])
+    rows = np.arange(len(block.episodes))
     if config.skill_limit:
         budget = np.minimum(budget, config.skill_limit)
-    progress = _Progress(block, skill, np.array(play.episodes), budget, recorder)
+    progress = _Progress(env, skill, np.array(block.episodes), budget, recorder)
 
-    value = partial(_value, agent, config.stop_alpha, block)
+    value = partial(_value, agent, config.stop_alpha, env)
     value_start = value(rows, skill)
-    previous = names.index(play.prefix[-2]) if len(play.prefix) > 1 else None
+    previous = names.index(block.prefix[-2]) if len(block.prefix) > 1 else None
     if previous is not None or (config.first_stitch and stitcher.before_first):
-        _stitch(progress, stitcher, play, previous, value_start, value)
+        _stitch(progress, stitcher, block, previous, value_start, value)
     stitch_steps = progress.steps.copy()
     value_end = value(rows, skill)
-    _execute(progress, agent, benchmark, config, play)
+    _execute(progress, agent, benchmark, config, block)
     return Segments(
         success=progress.success,
         stitch_steps=stitch_steps,
         steps=progress.steps,
         value_start=value_start,
         value_end=value_end,
-        snapshots=block.snapshot(rows),
+        snapshots=env.snapshot(rows),
     )
 
 
 def _stitch(
     progress: _Progress,
     stitcher: Stitcher,
-    play: Play,
+    block: Block,
     previous: int | None,
     value_start: np.ndarray,
     value: Callable[[np.ndarray, int], np.ndarray],
@@ -163,12 +163,12 @@ def _stitch(
     """Stitching phase: until the skill is achieved, the steps are used up, the stitcher's limit is
     reached, the stitcher wants no more, or, where `until_value_falls`, the value after a whole
     proposal is no higher than after the one before."""
-    streams = play.streams("planner", by_method=True)
+    streams = block.streams("planner", by_method=True)
     values = value_start.copy()
     rows = progress.open(np.arange(len(values)))
     while len(rows) and stitcher.limit:
         proposal = stitcher.propose(
-            torch.from_numpy(progress.block.observe(rows)),
+            torch.from_numpy(progress.env.observe(rows)),
             previous,
             progress.skill,
             [streams[row] for row in rows],
@@ -194,13 +194,13 @@ def _execute(
     agent: Agent,
     benchmark: Benchmark,
     config: RolloutConfig,
-    play: Play,
+    block: Block,
 ) -> None:
     """Execution phase: the skill's policy, until success or the end of the budget."""
-    streams = play.streams("policy")
-    rows = progress.open(np.arange(len(play.episodes)))
+    streams = block.streams("policy")
+    rows = progress.open(np.arange(len(block.episodes)))
     while len(rows):
-        states = torch.from_numpy(progress.block.observe(rows))
+        states = torch.from_numpy(progress.env.observe(rows))
         noise = None
         if config.temperature:
             noise = policy_noise(benchmark.actions, [streams[row] for row in rows])
@@ -217,22 +217,22 @@ def policy_noise(actions: ActionSpace, streams: Sequence[np.random.Generator]) -
 
 
 def _value(
-    agent: Agent, alpha: float, block: EpisodeBlock, rows: np.ndarray, skill: int
+    agent: Agent, alpha: float, env: VectorEnv, rows: np.ndarray, skill: int
 ) -> np.ndarray:
     """E[V] − stop_alpha · Var(V) of real states, (n,) float32: what the stop rule watches."""
     if not len(rows):
         return np.zeros(0, dtype=np.float32)
-    values = agent.values(torch.from_numpy(block.observe(rows)), skill)
+    values = agent.values(torch.from_numpy(env.observe(rows)), skill)
     return (values.mean(dim=0) - alpha * spread_over_members(values)).numpy()
 
 
 def play_from_start(
-    block: EpisodeBlock,
+    env: VectorEnv,
     agent: Agent,
     stitcher: Stitcher,
     benchmark: Benchmark,
     config: RolloutConfig,
-    play: Play,
+    block: Block,
     step_limit: int,
     recorder: Recorder | None = None,
 ) -> list[Segments]:
@@ -241,21 +241,21 @@ def play_from_start(
     Skill k's Segments covers the episodes that accomplished the k − 1 before it. The rollout tree
     must give the same bytes.
     """
-    episodes = np.array(play.episodes)
+    episodes = np.array(block.episodes)
     used = np.zeros(len(episodes), dtype=np.int64)
     outcome: list[Segments] = []
-    for depth in range(1, len(play.prefix) + 1):
-        here = Play(
-            play.root_seed,
-            play.benchmark,
-            play.seed,
-            play.method,
+    for depth in range(1, len(block.prefix) + 1):
+        here = Block(
+            block.root_seed,
+            block.benchmark,
+            block.seed,
+            block.method,
             tuple(int(e) for e in episodes),
-            play.prefix[:depth],
+            block.prefix[:depth],
         )
-        begin(block, here, outcome[-1].snapshots[outcome[-1].success] if outcome else None)
+        begin(env, here, outcome[-1].snapshots[outcome[-1].success] if outcome else None)
         budget = step_limit - used
-        segments = play_segment(block, agent, stitcher, benchmark, config, here, budget, recorder)
+        segments = play_segment(env, agent, stitcher, benchmark, config, here, budget, recorder)
         outcome.append(segments)
         used = (used + segments.steps)[segments.success]
         episodes = episodes[segments.success]
@@ -264,10 +264,10 @@ def play_from_start(
     return outcome
 
 
-def begin(block: EpisodeBlock, play: Play, snapshots: np.ndarray | None) -> None:
-    """Put a block at the start of a segment: the benchmark's start state, or skill boundaries."""
-    streams: Sequence[np.random.Generator] = play.streams("environment")
+def begin(env: VectorEnv, block: Block, snapshots: np.ndarray | None) -> None:
+    """Put an environment at the start of a segment: the benchmark's start state, or skill boundaries."""
+    streams: Sequence[np.random.Generator] = block.streams("environment")
     if snapshots is None:
-        block.reset(streams)
+        env.reset(streams)
     else:
-        block.restore(snapshots, streams)
+        env.restore(snapshots, streams)

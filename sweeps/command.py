@@ -12,13 +12,13 @@ from rich.console import Console
 from analysis.results import check_results
 from orchestrator.errors import UsageError, said_to_users
 from orchestrator.executors import ExecutorKind
+from orchestrator.reproduce import Settings
 from orchestrator.spec.tomls import Scale
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.storage.store import USUAL_STORE
 from orchestrator.work.progress import ConsoleProgress
-from orchestrator.work.reproduce import Settings
 from sweeps.costs import plan_lines
-from sweeps.report import results_names
+from sweeps.results.report import results_names
 from sweeps.spec import load_sweep, packaged_sweeps
 from sweeps.sweep import carry_out, default_out
 

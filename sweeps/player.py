@@ -11,7 +11,7 @@ from pathlib import Path
 import pandas as pd
 
 from analysis.episodes import episodes_from_segments
-from analysis.run import RunSpec
+from analysis.schema import RunSpec
 from orchestrator.errors import IncompleteError
 from orchestrator.executors.protocol import Executor
 from orchestrator.spec.spec import Spec

@@ -6,22 +6,22 @@ import json
 from pathlib import Path
 
 from orchestrator.errors import ChangedError, UsageError
+from orchestrator.reproduce import LazyExecutor, Settings
 from orchestrator.spec.structure import Plain, structure, to_plain
 from orchestrator.storage import locking
 from orchestrator.storage.provenance import provenance
 from orchestrator.storage.rundir import SWEEP, RunDirectory
 from orchestrator.storage.store import storage_errors
 from orchestrator.work.progress import Progress
-from orchestrator.work.reproduce import LazyExecutor, Settings
 from sweeps.confirm import confirm
 from sweeps.player import CountingExecutor, SpecPlayer
-from sweeps.report import write_report
+from sweeps.results.report import write_report
+from sweeps.results.table import write_table
+from sweeps.results.tracking import Tracker
 from sweeps.search import run_search, search_spec
 from sweeps.space import describe
 from sweeps.spec import SweepSpec
 from sweeps.study import RESULT, SweepStudy, feasible
-from sweeps.table import write_table
-from sweeps.tracking import Tracker
 
 MAY_CHANGE = ("trials", "enqueued", "confirm", "title", "tables")  # under a study that goes on
 

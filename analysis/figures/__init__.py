@@ -4,20 +4,20 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis.anatomy import begun
-from analysis.figures.anatomy import draw_anatomy
 from analysis.figures.curves import draw_curves
 from analysis.figures.diagnosis import draw_predictions, draw_value_curves
 from analysis.figures.drawn import Drawn
 from analysis.figures.forecast import draw_forecast
 from analysis.figures.pairs import draw_pairs
 from analysis.figures.scores import draw_scores
-from analysis.figures.showcases import draw_showcases
+from analysis.figures.showcase.showcases import draw_showcases
+from analysis.figures.stitches import draw_anatomy
 from analysis.figures.style import house_style, save
-from analysis.pairs import shown_orders, shown_pairs
 from analysis.run import Run
-from analysis.tables import Table
-from analysis.writers import seed_note
+from analysis.studies.pairs import shown_orders, shown_pairs
+from analysis.studies.stitches import begun
+from analysis.tables.table import Table
+from analysis.tables.writers import seed_note
 
 
 def draw_figures(
@@ -25,7 +25,7 @@ def draw_figures(
 ) -> list[Drawn]:
     """Draws what the run has data for, in the order of the report.
 
-    forecast: the run's `analysis.forecast.forecast_table`, where it has one.
+    forecast: the run's `analysis.studies.forecast.forecast_table`, where it has one.
     """
     drawn = []
     with house_style():

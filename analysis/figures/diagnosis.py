@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from analysis.figures.style import COLOURS, FAINT, INK, MARKERS, new_figure
-from analysis.run import RunSpec
+from analysis.schema import RunSpec
 
 COLUMNS = 4
 

@@ -7,13 +7,13 @@ from matplotlib.figure import Figure
 
 from analysis.figures.pairs import draw_matrix, two_panels
 from analysis.figures.style import INK
-from analysis.run import RunSpec
+from analysis.schema import RunSpec
 
 
 def draw_forecast(table: pd.DataFrame, spec: RunSpec) -> Figure:
     """Left the forecast, right each played pair's rate against its forecast.
 
-    table: `analysis.forecast.forecast_table`.
+    table: `analysis.studies.forecast.forecast_table`.
     """
     figure, (left, right) = two_panels(spec)
     forecast = table.set_index(["first", "second"])["forecast"].to_dict()

@@ -10,8 +10,8 @@ from matplotlib.image import AxesImage
 from matplotlib.patches import Rectangle
 
 from analysis.figures.style import INK, new_figure
-from analysis.pairs import second_skills
-from analysis.run import SEPARATOR, RunSpec
+from analysis.schema import SEPARATOR, RunSpec
+from analysis.studies.pairs import second_skills
 
 FRAME = "#FF3D8B"  # apart from every colour of the map
 

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from analysis.figures.style import COLOURS, FAINT, INK, MARKERS, new_figure
-from analysis.tables import Table
+from analysis.tables.table import Table
 
 WIDTH = 7.5  # inches
 ROW_GAP = 1.5  # free height between rows, in units of one method's line

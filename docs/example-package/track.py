@@ -32,11 +32,11 @@ class Track:
     factors = Factors(pose=(0,))
     skills = tuple(Skill(name, (place,)) for name, place in FLAGS.items())
 
-    def block(self) -> TrackBlock:
-        return TrackBlock()
+    def vector_env(self) -> TrackVectorEnv:
+        return TrackVectorEnv()
 
 
-class TrackBlock:
+class TrackVectorEnv:
     """N cars. The track is deterministic, so the noise streams go unused."""
 
     def __init__(self) -> None:
@@ -76,19 +76,19 @@ def demonstrations(config: TrackData, seed: int) -> Transitions:
     observations, actions, following, ends, skills, successes = [], [], [], [], [], []
     for skill, (name, place) in enumerate(FLAGS.items()):
         rng = stream("demonstrations", "track", seed, name)
-        block = TrackBlock()
-        block.reset([rng] * config.episodes)
+        env = TrackVectorEnv()
+        env.reset([rng] * config.episodes)
         drives: list[list[tuple[np.ndarray, np.ndarray, np.ndarray]]] = [[] for _ in everyone]
         for _ in range(LONGEST):
-            rows = everyone[~block.achieved(everyone, skill)]
-            before = block.observe(rows)
+            rows = everyone[~env.achieved(everyone, skill)]
+            before = env.observe(rows)
             wanted = 8 * (place - before[:, :1]) - 6 * before[:, 1:]
             noise = config.noise * rng.standard_normal((len(rows), 1))
             chosen = np.clip(wanted + noise, -1, 1).astype(np.float32)
-            block.step(rows, chosen)
-            for row, *step in zip(rows, before, chosen, block.observe(rows), strict=True):
+            env.step(rows, chosen)
+            for row, *step in zip(rows, before, chosen, env.observe(rows), strict=True):
                 drives[row].append((step[0], step[1], step[2]))
-        reached = block.achieved(everyone, skill)
+        reached = env.achieved(everyone, skill)
         for drive, success in zip(drives, reached, strict=True):
             for seen, action, after in drive:
                 observations.append(seen)

@@ -30,10 +30,10 @@ agent = Agent(skills.weights, conditions(MAZE), MAZE.actions)
 dynamics = Dynamics(learned.weights, config)
 
 # Play the first skill from the start.
-block, row = MAZE.block(), np.array([0])
-block.reset([stream("example")])
-while not block.achieved(row, first)[0]:
-    block.step(row, agent.act(torch.from_numpy(block.observe(row)), first, noise=None))
+env, row = MAZE.vector_env(), np.array([0])
+env.reset([stream("example")])
+while not env.achieved(row, first)[0]:
+    env.step(row, agent.act(torch.from_numpy(env.observe(row)), first, noise=None))
 
 # Stitch: plan towards high, certain value of the second skill, one action at a time.
 settings = MBStitchSettings(
@@ -42,7 +42,7 @@ settings = MBStitchSettings(
 models = Models(MAZE.actions, len(MAZE.skills), {"agent": agent, "dynamics": dynamics})
 stitcher, planning = MBStitch(settings, models), [stream("example", "planner")]
 for step in range(stitcher.limit + 1):
-    state = torch.from_numpy(block.observe(row))
+    state = torch.from_numpy(env.observe(row))
     values = agent.values(state, second)[:, 0]  # one a member of the ensemble
     print(f"step {step}: V of {MAZE.skills[second].name} {values.mean():.3f} ± {values.std():.3f}")
-    block.step(row, stitcher.propose(state, first, second, planning).actions[:, 0])
+    env.step(row, stitcher.propose(state, first, second, planning).actions[:, 0])

@@ -7,9 +7,9 @@ from orchestrator.builders.robosuite import ROBOSUITE_BUILDERS
 from orchestrator.builders.studies import Studies
 from stitching.data.robosuite.demonstrations import RobosuiteDataConfig
 from stitching.envs.protocol import Benchmark
-from stitching.envs.robosuite.block import GROUPS
 from stitching.envs.robosuite.can import CAN
 from stitching.envs.robosuite.door import DOOR
+from stitching.envs.robosuite.vector_env import GROUPS
 
 STUDIES = Studies("robosuite", {DOOR.name: DOOR, CAN.name: CAN}, GROUPS)
 

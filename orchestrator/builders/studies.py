@@ -14,20 +14,20 @@ from orchestrator.builders.parts import Builder, Inputs
 from orchestrator.spec.methods import method_of
 from orchestrator.spec.structure import Plain, structure
 from orchestrator.storage.store import Artifact
-from stitching.anatomy import StudiedMethod, anatomy
 from stitching.data.transitions import Transitions, concatenate
-from stitching.diagnosis import competence, prediction_errors, prices, value_progress
 from stitching.envs.maze import Maze
 from stitching.envs.protocol import Benchmark
-from stitching.forecast import pair_forecast
 from stitching.methods.mb_stitch import MB_STITCH, MBStitch
 from stitching.methods.no_stitch import NO_STITCH
 from stitching.methods.protocol import Models, Stitcher
 from stitching.models.dynamics import Dynamics
 from stitching.rollout import RolloutConfig
-from stitching.showcase.maze import maze_showcase
-from stitching.showcase.physics import physics_showcase
-from stitching.showcase.shown import Shown
+from stitching.studies.diagnosis import competence, prediction_errors, prices, value_progress
+from stitching.studies.forecast import pair_forecast
+from stitching.studies.showcase.maze import maze_showcase
+from stitching.studies.showcase.physics import physics_showcase
+from stitching.studies.showcase.shown import Shown
+from stitching.studies.stitches import StudiedMethod, anatomy
 
 
 def _stitcher(method: str, settings: Plain, models: Models) -> Stitcher:
@@ -66,7 +66,7 @@ def maze_showcase_builder(maze: Maze) -> Builder:
         demonstrations = Transitions(**inputs["demonstrations"].arrays)
         return Artifact({}, maze_showcase(maze, demonstrations, _shown(maze, params, inputs)))
 
-    return Builder(make, ("stitching.showcase.maze", *PLAYED), SETUP)
+    return Builder(make, ("stitching.studies.showcase.maze", *PLAYED), SETUP)
 
 
 @dataclass(frozen=True)
@@ -80,13 +80,18 @@ class Studies:
 
     @property
     def builders(self) -> dict[str, Builder]:
-        judging = ("stitching.diagnosis", *(["stitching.forecast"] if self.foretells else []))
+        judging = (
+            "stitching.studies.diagnosis",
+            *(["stitching.studies.forecast"] if self.foretells else []),
+        )
         return {
             f"{self.family}-showcase": Builder(
-                self._showcase, ("stitching.showcase.physics", *PLAYED), SETUP
+                self._showcase, ("stitching.studies.showcase.physics", *PLAYED), SETUP
             ),
             f"{self.family}-diagnosis": Builder(self._diagnosis, judging, SETUP),
-            f"{self.family}-anatomy": Builder(self._anatomy, ("stitching.anatomy", *PLAYED), SETUP),
+            f"{self.family}-anatomy": Builder(
+                self._anatomy, ("stitching.studies.stitches", *PLAYED), SETUP
+            ),
         }
 
     def _showcase(self, params: Plain, inputs: Inputs) -> Artifact:
@@ -94,7 +99,7 @@ class Studies:
         return Artifact({}, physics_showcase(benchmark, _shown(benchmark, params, inputs)))
 
     def _diagnosis(self, params: Plain, inputs: Inputs) -> Artifact:
-        """What `stitching.diagnosis` knows of the models, on the data of the role "held-out"."""
+        """What `stitching.studies.diagnosis` says of the models, on the held-out data."""
         benchmark = self.benchmarks[params["benchmark"]]
         models = load_models(benchmark, inputs)
         agent, dynamics = models.agent, models.one("dynamics", Dynamics)

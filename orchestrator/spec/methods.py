@@ -10,7 +10,7 @@ from typing import Any
 from orchestrator.errors import UsageError
 from orchestrator.spec.structure import Plain, to_plain
 from stitching.envs.first_times import FirstTimes
-from stitching.envs.protocol import Benchmark, EpisodeBlock
+from stitching.envs.protocol import Benchmark, VectorEnv
 from stitching.methods.no_stitch import NO_STITCH
 from stitching.methods.protocol import Method, MethodSettings
 from stitching.methods.registry import METHODS
@@ -66,13 +66,13 @@ def method_rollout(method: str, rollout: RolloutConfig) -> RolloutConfig:
     )
 
 
-def method_block(method: str, benchmark: Benchmark) -> EpisodeBlock:
+def method_env(method: str, benchmark: Benchmark) -> VectorEnv:
     """A new block of episodes, in which a method's skills are accomplished as is right for it.
 
     What a policy did before it was asked for, since nobody told it what to do, does not count.
     """
-    block = benchmark.block()
-    return block if method_of(method).told else FirstTimes(block, len(benchmark.skills))
+    env = benchmark.vector_env()
+    return env if method_of(method).told else FirstTimes(env, len(benchmark.skills))
 
 
 def parse_method(method: str) -> tuple[str, dict[str, Any]]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Union
 
 import tyro
 
-from analysis.rows import ROW_RULES
+from analysis.tables.rows import ROW_RULES
 from orchestrator.benchmarks.registry import BENCHMARKS, KITS
 from orchestrator.builders.models import LOADERS
 from orchestrator.errors import UsageError

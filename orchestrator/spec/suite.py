@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from analysis.run import plain_label
+from analysis.schema import plain_label
 from orchestrator.errors import UsageError
 from orchestrator.spec.spec import (
     Spec,

@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.run import SEPARATOR, VARIANT, plain_label
+from analysis.schema import SEPARATOR, VARIANT, plain_label
 from orchestrator.benchmarks.registry import KITS
 from orchestrator.errors import UsageError
 from orchestrator.spec.methods import first_method, method_label, method_of

@@ -7,13 +7,13 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from analysis.run import VARIANT
+from analysis.schema import VARIANT
 from orchestrator.tracking.names import allowed_name
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from analysis.run import RunSpec, TableEntry
+    from analysis.schema import RunSpec, TableEntry
 
 Curves = dict[str, list[tuple[int, float]]]
 
@@ -42,8 +42,8 @@ def seed_scores(episodes: pd.DataFrame, spec: RunSpec, entry: TableEntry) -> dic
 
     Intervals cover other episodes of this seed's models.
     """
-    from analysis.rows import place_tasks
     from analysis.statistics import arrange, estimate, generator
+    from analysis.tables.rows import place_tasks
 
     metrics: dict[str, float] = {}
     places = place_tasks(spec, entry)[["task", "row"]]

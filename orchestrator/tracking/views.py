@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from analysis.run import RunSpec, leaves
+from analysis.schema import RunSpec, leaves
 from orchestrator.tracking.metrics import Curves, finite, learning_curves, reported, seed_scores
 from orchestrator.tracking.names import allowed_name, short_text
 from orchestrator.tracking.receipt import Status, digest, published_files

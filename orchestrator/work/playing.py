@@ -11,22 +11,22 @@ import numpy as np
 
 from orchestrator.benchmarks.registry import BENCHMARKS
 from orchestrator.builders.models import LOADERS
-from orchestrator.spec.methods import method_block, method_of
+from orchestrator.spec.methods import method_env, method_of
 from orchestrator.storage.ledger import Outcome
 from orchestrator.storage.store import Artifact
 from orchestrator.work.jobs import BlockReport, BlockTask, PlayJob, Report
-from stitching.envs.protocol import EpisodeBlock
+from stitching.envs.protocol import VectorEnv
 from stitching.methods.protocol import Models
 from stitching.models.agent import Agent
-from stitching.rollout import Play, begin, play_segment
+from stitching.rollout import begin, play_segment
 
 
 class BlockPlayer:
-    """Plays blocks; keeps loaded models and environment blocks between them, and nothing else."""
+    """Plays blocks; keeps loaded models and environments between them, and nothing else."""
 
     def __init__(self) -> None:
         self._models: dict[tuple[str, str], Any] = {}
-        self._blocks: dict[tuple[str, str], EpisodeBlock] = {}
+        self._envs: dict[tuple[str, str], VectorEnv] = {}
 
     def play(self, job: PlayJob, artifacts: Mapping[str, Artifact]) -> Report:
         """Every block of the job; one that fails does not touch the others. Artifacts by key."""
@@ -52,13 +52,13 @@ class BlockPlayer:
         agent = models.one(method.policy, Agent)
         stitcher = method.stitcher(task.settings, models)
         episodes, used, snapshots = survivors(task, parent)
-        play = Play(
+        block = Block(
             task.root_seed, task.benchmark, task.seed, task.method, tuple(episodes), task.prefix
         )
-        block = self._block(task)
-        begin(block, play, snapshots)
+        env = self._env(task)
+        begin(env, block, snapshots)
         segments = play_segment(
-            block, agent, stitcher, benchmark, task.rollout, play, task.step_limit - used
+            env, agent, stitcher, benchmark, task.rollout, block, task.step_limit - used
         )
         return Outcome(
             {
@@ -73,11 +73,11 @@ class BlockPlayer:
             }
         )
 
-    def _block(self, task: BlockTask) -> EpisodeBlock:
+    def _env(self, task: BlockTask) -> VectorEnv:
         place = task.benchmark, method_of(task.method).policy
-        if place not in self._blocks:
-            self._blocks[place] = method_block(task.method, BENCHMARKS[task.benchmark])
-        return self._blocks[place]
+        if place not in self._envs:
+            self._envs[place] = method_env(task.method, BENCHMARKS[task.benchmark])
+        return self._envs[place]
 
     def _model(self, task: BlockTask, kind: str, artifacts: Mapping[str, Artifact]) -> Any:
         key = task.artifacts[kind]

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stitching.envs.protocol import EpisodeBlock
+from stitching.envs.protocol import VectorEnv
 
 
 class FirstTimes:
-    """A block for policies that are not told which skill is asked for, and may be ahead of it.
+    """An environment for policies that are not told which skill is asked for, and may be ahead of it.
 
     A goal that has held before the skill was asked for counts as not achieved, also where it holds
     again: some come undone, as the kettle's when the hand leaves it. Snapshots say what has held,
@@ -18,30 +18,30 @@ class FirstTimes:
     whatever else comes in between.
     """
 
-    def __init__(self, block: EpisodeBlock, skills: int) -> None:
-        self._block, self._skills = block, skills
+    def __init__(self, env: VectorEnv, skills: int) -> None:
+        self._env, self._skills = env, skills
         self._before = np.zeros((0, skills), dtype=bool)  # (N, skills) what held until this segment
         self._held = self._before  # (N, skills) and until now
 
     def reset(self, streams: Sequence[np.random.Generator]) -> None:
-        self._block.reset(streams)
+        self._env.reset(streams)
         self._before = self._holding(np.arange(len(streams)))
         self._held = self._before.copy()
 
     def restore(self, snapshots: np.ndarray, streams: Sequence[np.random.Generator]) -> None:
         inner, held = np.split(snapshots, [-self._skills], axis=1)
-        self._block.restore(inner, streams)
+        self._env.restore(inner, streams)
         self._before = held.astype(bool)
         self._held = self._before.copy()
 
     def snapshot(self, rows: np.ndarray) -> np.ndarray:
-        return np.hstack([self._block.snapshot(rows), self._held[rows]])
+        return np.hstack([self._env.snapshot(rows), self._held[rows]])
 
     def observe(self, rows: np.ndarray) -> np.ndarray:
-        return self._block.observe(rows)
+        return self._env.observe(rows)
 
     def step(self, rows: np.ndarray, actions: np.ndarray) -> None:
-        self._block.step(rows, actions)
+        self._env.step(rows, actions)
         self._held[rows] |= self._holding(rows)
 
     def achieved(self, rows: np.ndarray, skill: int) -> np.ndarray:
@@ -50,5 +50,5 @@ class FirstTimes:
     def _holding(self, rows: np.ndarray) -> np.ndarray:
         """Which goals hold now: (n, skills) bool."""
         return np.stack(
-            [self._block.achieved(rows, skill) for skill in range(self._skills)], axis=1
+            [self._env.achieved(rows, skill) for skill in range(self._skills)], axis=1
         )

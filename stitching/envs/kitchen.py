@@ -1,7 +1,7 @@
-"""FrankaKitchen-v1: a 9-joint arm, seven things to do, all episodes of a block on one model.
+"""FrankaKitchen-v1: a 9-joint arm, seven things to do, all episodes on one model.
 
 The benchmark of Relay Policy Learning (Gupta et al. 2019, arXiv:1910.11956) as gymnasium-robotics
-1.4.2 has it; its model file and noise table are read from there. A block's episode equals the
+1.4.2 has it; its model file and noise table are read from there. An episode equals the
 original's bit for bit, given the same actions and a generator in the same state. What differs is
 by intent: success is told from the goal distances of the current state alone, and physics that
 diverge end their episode, where the original goes on from MuJoCo's silent reset.
@@ -134,8 +134,8 @@ class Kitchen:
         objects = self.object_noise_ratio * np.r_[position[8:29], velocity[9:29]]
         return np.r_[robot, objects]
 
-    def block(self) -> KitchenBlock:
-        return KitchenBlock(self)
+    def vector_env(self) -> KitchenVectorEnv:
+        return KitchenVectorEnv(self)
 
 
 def goal_distances(positions: np.ndarray, skill: int) -> np.ndarray:
@@ -173,8 +173,8 @@ def _robot_table() -> dict[str, np.ndarray]:
     }
 
 
-class KitchenBlock:
-    """N kitchens, with one `MjData` each, kept and reused from one use of the block to the next.
+class KitchenVectorEnv:
+    """N kitchens, with one `MjData` each, kept and reused from one use to the next.
 
     An action asks the robot's joints for velocities, in units of ±2 rad/s (fingers ±2 m/s); they
     become position targets counted from the positions *last seen*, noise included. So what was seen

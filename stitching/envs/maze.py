@@ -98,11 +98,11 @@ class Maze:
             row, col, count = row + direction[0], col + direction[1], count + 1
         return count
 
-    def block(self) -> MazeBlock:
-        return MazeBlock(self)
+    def vector_env(self) -> MazeVectorEnv:
+        return MazeVectorEnv(self)
 
 
-class MazeBlock:
+class MazeVectorEnv:
     """N agents in one maze. The maze itself is deterministic, so the noise streams go unused."""
 
     def __init__(self, maze: Maze) -> None:

@@ -1,4 +1,4 @@
-"""What every benchmark offers: skills, shapes, and a block of episodes stepped together."""
+"""What every benchmark offers: skills, shapes, and many episodes that are stepped together."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ class Skill:
     condition: tuple[float, ...]
 
 
-class EpisodeBlock(Protocol):
+class VectorEnv(Protocol):
     """N episodes of one benchmark, stepped together. Rows (n,) int64 say which of them are meant.
 
-    A block holds no randomness of its own: each episode draws its noise from the stream it was
+    It holds no randomness of its own: each episode draws its noise from the stream it was
     handed at `reset` or `restore`, so nothing depends on which worker plays it, or when.
     """
 
@@ -87,8 +87,8 @@ class Benchmark(Protocol):
     @property
     def factors(self) -> Factors: ...
 
-    def block(self) -> EpisodeBlock:
-        """A new, empty block of episodes."""
+    def vector_env(self) -> VectorEnv:
+        """A new environment without episodes: `reset` or `restore` starts them."""
 
 
 def skill_index(benchmark: Benchmark, name: str) -> int:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from stitching.envs.protocol import Benchmark, EpisodeBlock, conditions
+from stitching.envs.protocol import Benchmark, VectorEnv, conditions
 from stitching.streams import stream
 
 EPISODES, STEPS = 3, 6
@@ -26,11 +26,11 @@ def streams(
 
 def started(
     benchmark: Benchmark, episodes: Sequence[int] | np.ndarray = range(EPISODES)
-) -> EpisodeBlock:
-    """A block of these episodes at their start."""
-    block = benchmark.block()
-    block.reset(streams(episodes))
-    return block
+) -> VectorEnv:
+    """An environment with these episodes at their start."""
+    env = benchmark.vector_env()
+    env.reset(streams(episodes))
+    return env
 
 
 def actions_of(
@@ -44,33 +44,33 @@ def actions_of(
     return np.stack(own, axis=1)
 
 
-def achievements(benchmark: Benchmark, block: EpisodeBlock, rows: np.ndarray) -> np.ndarray:
+def achievements(benchmark: Benchmark, env: VectorEnv, rows: np.ndarray) -> np.ndarray:
     """Which skills' goals hold: (n, skills) bool."""
-    return np.stack([block.achieved(rows, skill) for skill in range(len(benchmark.skills))], axis=1)
+    return np.stack([env.achieved(rows, skill) for skill in range(len(benchmark.skills))], axis=1)
 
 
-def look(benchmark: Benchmark, block: EpisodeBlock, rows: np.ndarray) -> tuple[bytes, ...]:
+def look(benchmark: Benchmark, env: VectorEnv, rows: np.ndarray) -> tuple[bytes, ...]:
     """All that can be told about these episodes."""
-    seen = block.observe(rows), block.snapshot(rows), achievements(benchmark, block, rows)
+    seen = env.observe(rows), env.snapshot(rows), achievements(benchmark, env, rows)
     return tuple(array.tobytes() for array in seen)
 
 
 def played(
-    benchmark: Benchmark, block: EpisodeBlock, rows: np.ndarray, actions: np.ndarray
+    benchmark: Benchmark, env: VectorEnv, rows: np.ndarray, actions: np.ndarray
 ) -> list[tuple[bytes, ...]]:
     """What is seen at the start and after each step."""
-    scenes = [look(benchmark, block, rows)]
+    scenes = [look(benchmark, env, rows)]
     for step in actions:
-        block.step(rows, step)
-        scenes.append(look(benchmark, block, rows))
+        env.step(rows, step)
+        scenes.append(look(benchmark, env, rows))
     return scenes
 
 
-def midway(benchmark: Benchmark, use: str = "before") -> EpisodeBlock:
-    """A block of all episodes after some actions."""
-    block = started(benchmark)
-    played(benchmark, block, ROWS, actions_of(benchmark, ROWS, use))
-    return block
+def midway(benchmark: Benchmark, use: str = "before") -> VectorEnv:
+    """An environment with all episodes after some actions."""
+    env = started(benchmark)
+    played(benchmark, env, ROWS, actions_of(benchmark, ROWS, use))
+    return env
 
 
 class BenchmarkConformance:
@@ -85,26 +85,26 @@ class BenchmarkConformance:
         assert len(np.unique(table, axis=0)) == len(benchmark.skills)
 
     def test_shapes_and_types(self, benchmark: Benchmark) -> None:
-        block = started(benchmark)
+        env = started(benchmark)
         for rows in (ROWS, ROWS[1:], ROWS[:0]):
-            block.step(rows, benchmark.actions.uniform(stream("actions"), (len(rows),)))
-            observations, snapshots = block.observe(rows), block.snapshot(rows)
+            env.step(rows, benchmark.actions.uniform(stream("actions"), (len(rows),)))
+            observations, snapshots = env.observe(rows), env.snapshot(rows)
             assert observations.shape == (len(rows), benchmark.observation_size)
             assert observations.dtype == np.float32
             assert snapshots.shape == (len(rows), benchmark.snapshot_size)
             assert snapshots.dtype == np.float64
             for skill in range(len(benchmark.skills)):
-                achieved = block.achieved(rows, skill)
+                achieved = env.achieved(rows, skill)
                 assert achieved.shape == (len(rows),)
                 assert achieved.dtype == np.bool_
 
     def test_what_is_seen_is_finite(self, benchmark: Benchmark) -> None:
-        block = started(benchmark)
+        env = started(benchmark)
         for actions in actions_of(benchmark, ROWS):
-            assert np.isfinite(block.observe(ROWS)).all()
-            block.step(ROWS, actions)
-        assert np.isfinite(block.observe(ROWS)).all()
-        assert np.isfinite(block.snapshot(ROWS)).all()
+            assert np.isfinite(env.observe(ROWS)).all()
+            env.step(ROWS, actions)
+        assert np.isfinite(env.observe(ROWS)).all()
+        assert np.isfinite(env.snapshot(ROWS)).all()
 
     def test_the_start_leaves_something_to_do(self, benchmark: Benchmark) -> None:
         at_start = achievements(benchmark, started(benchmark), ROWS)
@@ -127,15 +127,15 @@ class BenchmarkConformance:
         assert look(benchmark, watched, ROWS) == look(benchmark, unwatched, ROWS)
 
     def test_what_is_handed_out_is_a_copy(self, benchmark: Benchmark) -> None:
-        block = started(benchmark)
-        before = look(benchmark, block, ROWS)
-        block.observe(ROWS)[:] = 17
-        block.snapshot(ROWS)[:] = 17
-        block.achieved(ROWS, 0)[:] = True
-        assert look(benchmark, block, ROWS) == before
-        kept = block.observe(ROWS), block.snapshot(ROWS)
+        env = started(benchmark)
+        before = look(benchmark, env, ROWS)
+        env.observe(ROWS)[:] = 17
+        env.snapshot(ROWS)[:] = 17
+        env.achieved(ROWS, 0)[:] = True
+        assert look(benchmark, env, ROWS) == before
+        kept = env.observe(ROWS), env.snapshot(ROWS)
         bytes_kept = [array.tobytes() for array in kept]
-        played(benchmark, block, ROWS, actions_of(benchmark, ROWS))
+        played(benchmark, env, ROWS, actions_of(benchmark, ROWS))
         assert [array.tobytes() for array in kept] == bytes_kept
 
     def test_streams_decide_not_the_company(self, benchmark: Benchmark) -> None:
@@ -145,21 +145,21 @@ class BenchmarkConformance:
         assert played(benchmark, started(benchmark), ROWS, actions) == together
 
         order = [2, 0]
-        block = started(benchmark, order)
+        env = started(benchmark, order)
         for step, scene in zip([None, *actions], together, strict=True):
             if step is not None:
-                block.step(np.arange(2), step[order])
+                env.step(np.arange(2), step[order])
             observations = np.frombuffer(scene[0], dtype=np.float32).reshape(EPISODES, -1)
             snapshots = np.frombuffer(scene[1]).reshape(EPISODES, -1)
-            assert block.observe(np.arange(2)).tobytes() == observations[order].tobytes()
-            assert block.snapshot(np.arange(2)).tobytes() == snapshots[order].tobytes()
+            assert env.observe(np.arange(2)).tobytes() == observations[order].tobytes()
+            assert env.snapshot(np.arange(2)).tobytes() == snapshots[order].tobytes()
 
     def test_stepping_some_rows_leaves_the_others(self, benchmark: Benchmark) -> None:
-        block = midway(benchmark)
+        env = midway(benchmark)
         chosen, others = np.array([1]), np.array([0, 2])
-        before = look(benchmark, block, others)
-        scenes = played(benchmark, block, chosen, actions_of(benchmark, chosen))
-        assert look(benchmark, block, others) == before
+        before = look(benchmark, env, others)
+        scenes = played(benchmark, env, chosen, actions_of(benchmark, chosen))
+        assert look(benchmark, env, others) == before
         assert len(set(scenes)) > 1
 
     def test_rows_stepped_apart_go_as_they_would_together(self, benchmark: Benchmark) -> None:
@@ -173,24 +173,25 @@ class BenchmarkConformance:
     def test_a_snapshot_continues_exactly(self, benchmark: Benchmark) -> None:
         """As if nothing had happened, if the noise goes on as it would have."""
         noise = streams()
-        block = benchmark.block()
-        block.reset(noise)
-        played(benchmark, block, ROWS, actions_of(benchmark, ROWS, "before"))
+        env = benchmark.vector_env()
+        env.reset(noise)
+        played(benchmark, env, ROWS, actions_of(benchmark, ROWS, "before"))
 
-        other = benchmark.block()
-        other.restore(block.snapshot(ROWS), copy.deepcopy(noise))
+        other = benchmark.vector_env()
+        other.restore(env.snapshot(ROWS), copy.deepcopy(noise))
         actions = actions_of(benchmark, ROWS, "after")
-        assert played(benchmark, other, ROWS, actions) == played(benchmark, block, ROWS, actions)
+        assert played(benchmark, other, ROWS, actions) == played(benchmark, env, ROWS, actions)
 
     def test_restoring_forgets_all_that_was(self, benchmark: Benchmark) -> None:
-        """Workers keep their blocks: what was played in one before must not matter."""
+        """Workers keep their environments: what was played in one before must not matter."""
         snapshots = midway(benchmark).snapshot(ROWS)
-        used, larger, new = midway(benchmark, "other"), benchmark.block(), benchmark.block()
+        larger, new = benchmark.vector_env(), benchmark.vector_env()
+        used = midway(benchmark, "other")
         larger.reset(streams(range(EPISODES + 2), "larger"))
         scenes = []
-        for block in (used, larger, new):
-            block.restore(snapshots, streams(use="after"))
-            scenes.append(played(benchmark, block, ROWS, actions_of(benchmark, ROWS, "after")))
+        for env in (used, larger, new):
+            env.restore(snapshots, streams(use="after"))
+            scenes.append(played(benchmark, env, ROWS, actions_of(benchmark, ROWS, "after")))
         assert scenes[0] == scenes[1] == scenes[2]
 
     def test_resetting_forgets_all_that_was(self, benchmark: Benchmark) -> None:
@@ -202,20 +203,20 @@ class BenchmarkConformance:
 
     def test_snapshots_survive_their_storage(self, benchmark: Benchmark) -> None:
         snapshots = midway(benchmark).snapshot(ROWS)
-        block = benchmark.block()
+        env = benchmark.vector_env()
         stored = np.frombuffer(snapshots.tobytes()).reshape(
             snapshots.shape
         )  # read-only, as from Ray
-        block.restore(stored, streams(use="after"))
-        assert block.snapshot(ROWS).tobytes() == snapshots.tobytes()
-        block.step(ROWS, actions_of(benchmark, ROWS)[0])
+        env.restore(stored, streams(use="after"))
+        assert env.snapshot(ROWS).tobytes() == snapshots.tobytes()
+        env.step(ROWS, actions_of(benchmark, ROWS)[0])
         assert stored.tobytes() == snapshots.tobytes()
 
     def test_some_of_the_snapshots_go_on_alone(self, benchmark: Benchmark) -> None:
         """As in the tree: an episode that failed has no children."""
         snapshots = midway(benchmark).snapshot(ROWS)
         survivors = np.array([2, 1])
-        everyone, some = benchmark.block(), benchmark.block()
+        everyone, some = benchmark.vector_env(), benchmark.vector_env()
         everyone.restore(snapshots, streams(use="after"))
         some.restore(snapshots[survivors], streams(survivors, "after"))
         for actions in actions_of(benchmark, ROWS, "after"):
@@ -224,11 +225,11 @@ class BenchmarkConformance:
         assert look(benchmark, some, np.arange(2)) == look(benchmark, everyone, survivors)
 
     def test_a_block_of_nobody(self, benchmark: Benchmark) -> None:
-        block = benchmark.block()
-        block.reset([])
-        assert block.observe(ROWS[:0]).shape == (0, benchmark.observation_size)
-        block.restore(block.snapshot(ROWS[:0]), [])
-        assert block.snapshot(ROWS[:0]).shape == (0, benchmark.snapshot_size)
+        env = benchmark.vector_env()
+        env.reset([])
+        assert env.observe(ROWS[:0]).shape == (0, benchmark.observation_size)
+        env.restore(env.snapshot(ROWS[:0]), [])
+        assert env.snapshot(ROWS[:0]).shape == (0, benchmark.snapshot_size)
 
     def test_factors_are_columns_each_of_one_part(self, benchmark: Benchmark) -> None:
         factors, size = benchmark.factors, benchmark.observation_size

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from analysis.writers import markdown_table, seed_note
+from analysis.tables.writers import markdown_table, seed_note
 from orchestrator.spec.spec import Spec
 from orchestrator.spec.structure import Plain
 from sweeps.candidates import NO_STITCH

@@ -11,11 +11,11 @@ from itertools import permutations
 
 import pandas as pd
 
-from analysis.implied import MEAN, bounds, skills
-from analysis.misfit import PROFILED, misfit
-from analysis.paper import paper_scores
-from analysis.profile import MARGIN, profile
-from analysis.writers import markdown_table
+from analysis.paper.implied import MEAN, bounds, skills
+from analysis.paper.misfit import PROFILED, misfit
+from analysis.paper.numbers import paper_scores
+from analysis.paper.profile import MARGIN, profile
+from analysis.tables.writers import markdown_table
 from orchestrator.errors import UsageError
 from orchestrator.spec.methods import method_label
 from orchestrator.spec.spec import Spec
@@ -33,7 +33,7 @@ PROFILES_SHOWN = 5  # of the best trials
 class Profiled:
     """How one setting's unstitched skills did, and both methods."""
 
-    profiles: Mapping[str, pd.DataFrame]  # method → `analysis.profile.COLUMNS`
+    profiles: Mapping[str, pd.DataFrame]  # method → `analysis.paper.profile.COLUMNS`
     scores: Mapping[tuple[str, int], float]  # (method, skills of a task) → mean over such tasks
 
     @property
@@ -199,5 +199,7 @@ def _profiles(trials: Sequence[Plain]) -> Iterator[str]:
 
 
 def _marked(rate: float, low: float, high: float) -> str:
-    near = low - MARGIN - 1e-9 <= rate <= high + MARGIN + 1e-9  # as `analysis.profile` compares
+    near = (
+        low - MARGIN - 1e-9 <= rate <= high + MARGIN + 1e-9
+    )  # as `analysis.paper.profile` compares
     return f"{rate:.3f}" if near else f"**{rate:.3f}**"

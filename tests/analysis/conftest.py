@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.run import RunSpec
+from analysis.schema import RunSpec
 
 SKILLS = ["g0", "g1", "g2", "g3"]
 LABELS = {

@@ -12,7 +12,7 @@ from analysis.compare import (
     settings_apart,
     settings_markdown,
 )
-from analysis.writers import seed_note
+from analysis.tables.writers import seed_note
 
 
 @pytest.fixture

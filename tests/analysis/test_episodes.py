@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from analysis.episodes import COLUMNS, episodes_from_segments, write_episodes
-from analysis.run import RunError, RunSpec
+from analysis.schema import RunError, RunSpec
 
 
 def play_slowly(

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.figures.scenes import NoPictureError
+from analysis.figures.showcase.scenes import NoPictureError
 from analysis.report import build_report, export_results
 from tests.analysis.kitchen_run import write_kitchen
 
@@ -34,7 +34,7 @@ def _drawing_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
         grey = np.linspace(0, 255, 12 * 16 * 3).reshape(12, 16, 3)
         return np.repeat(grey[None], len(positions), axis=0).astype(np.uint8)
 
-    monkeypatch.setattr("analysis.figures.showcases.render_frames", frames)
+    monkeypatch.setattr("analysis.figures.showcase.showcases.render_frames", frames)
 
 
 def test_the_same_run_gives_the_same_bytes(tmp_path: Path, write_run: Any) -> None:
@@ -74,7 +74,7 @@ def test_without_a_picture_the_report_is_written_and_says_why(
     def nothing(scene: dict[str, Any], positions: np.ndarray) -> np.ndarray:
         raise NoPictureError("MuJoCo draws with nothing <here>; install libegl1 or libosmesa6")
 
-    monkeypatch.setattr("analysis.figures.showcases.render_frames", nothing)
+    monkeypatch.setattr("analysis.figures.showcase.showcases.render_frames", nothing)
     run_dir = write_kitchen(write_run, tmp_path / "run")
     (folder,) = export_results(run_dir, tmp_path / "results")
     page = (run_dir / "report" / "index.html").read_text(encoding="utf-8")

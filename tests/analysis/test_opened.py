@@ -7,7 +7,7 @@ import pytest
 
 from analysis import open_run
 from analysis.report import build_report
-from analysis.run import RunError
+from analysis.schema import RunError
 
 
 @pytest.fixture

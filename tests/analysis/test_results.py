@@ -8,7 +8,7 @@ import pytest
 
 from analysis.report import export_results
 from analysis.results import SCALES, Extent, check_results, extent_of, provenance_text
-from analysis.run import RunError
+from analysis.schema import RunError
 
 EXTENT: Extent = {"scale": "quick", "seeds": 2, "episodes": 10}
 

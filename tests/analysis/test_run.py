@@ -3,7 +3,8 @@ from typing import Any
 
 import pytest
 
-from analysis.run import RunError, RunSpec, load_run
+from analysis.run import load_run
+from analysis.schema import RunError, RunSpec
 
 
 def test_reads_a_whole_run_directory(tmp_path: Path, write_run: Any) -> None:

@@ -59,7 +59,7 @@ def against_bare_physics(episodes: int, rounds: int) -> None:
     model, rows = kitchen_model(), np.arange(episodes)
     actions = smooth_actions(rounds * TURN, episodes).reshape(rounds, TURN, episodes, 9)
     bare = [mujoco.MjData(model) for _ in rows]
-    watched, rehearsal = KITCHEN.block(), KITCHEN.block()
+    watched, rehearsal = KITCHEN.vector_env(), KITCHEN.vector_env()
     watched.reset([stream("bench", int(row)) for row in rows])
     block_watch, bare_watch = Watch(), Watch()
     for turn in range(rounds):
@@ -112,14 +112,14 @@ def original(bare_step: float, steps: int = 200) -> None:
 
 def wall_rate(episodes: int, steps: int = 40) -> float:
     """Episode steps per second of one process, by the clock on the wall."""
-    block, rows = KITCHEN.block(), np.arange(episodes)
-    block.reset([stream("bench", int(row)) for row in rows])
-    block.step(rows, np.zeros((episodes, 9), dtype=np.float32))
+    env, rows = KITCHEN.vector_env(), np.arange(episodes)
+    env.reset([stream("bench", int(row)) for row in rows])
+    env.step(rows, np.zeros((episodes, 9), dtype=np.float32))
     began = perf_counter()
     for actions in smooth_actions(steps, episodes):
-        block.observe(rows)
-        block.step(rows, actions)
-        block.achieved(rows, 0)
+        env.observe(rows)
+        env.step(rows, actions)
+        env.achieved(rows, 0)
     return steps * episodes / (perf_counter() - began)
 
 

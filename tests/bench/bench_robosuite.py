@@ -26,14 +26,14 @@ ROUNDS = 5
 
 def ours(benchmark: Door | Can, episodes: int) -> tuple[float, np.ndarray]:
     """Seconds an episode, and the actions (steps, 5) of the first."""
-    block, rows = benchmark.block(), np.arange(episodes)
-    block.reset([stream("bench", int(row)) for row in rows])
-    actions = np.stack([path_actions(benchmark, seen) for seen in block.observe(rows)], axis=1)
+    env, rows = benchmark.vector_env(), np.arange(episodes)
+    env.reset([stream("bench", int(row)) for row in rows])
+    actions = np.stack([path_actions(benchmark, seen) for seen in env.observe(rows)], axis=1)
     began = process_time()
     for action in actions:
-        block.observe(rows)
-        block.step(rows, action)
-        block.achieved(rows, 0)
+        env.observe(rows)
+        env.step(rows, action)
+        env.achieved(rows, 0)
     return (process_time() - began) / episodes, actions[:, 0]
 
 
@@ -63,9 +63,9 @@ def measure(episodes: int = 10) -> Iterator[Result]:
         pairs = []
         for _ in range(ROUNDS):
             pairs.append((ours(benchmark, episodes)[0], theirs(original, actions)[0]))
-        block, plain = (median(seconds) for seconds in zip(*pairs, strict=True))
+        env, plain = (median(seconds) for seconds in zip(*pairs, strict=True))
         numbers = {
-            "our actions/s": len(actions) / block,
+            "our actions/s": len(actions) / env,
             "their actions/s": len(actions) / plain,
             "control steps an action": control_steps / len(actions),
         }

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator import reproduce as reproducing
 from orchestrator.executors import open_executor
 from orchestrator.spec.spec import Spec
-from orchestrator.work import reproduce as reproducing
 from orchestrator.work.plan import Plan, make_plan
 from tests.orchestrator.tiny import Counted, Place, promised_bytes, tiny_spec
 

@@ -202,7 +202,7 @@ def test_run_and_run_again(cli: Cli, place: Place, expected: dict[str, bytes]) -
 
     before = {path: path.stat().st_mtime_ns for path in (place.out / "report").iterdir()}
     started = time.monotonic()
-    with mock.patch("orchestrator.work.reproduce.open_executor", side_effect=AssertionError):
+    with mock.patch("orchestrator.reproduce.open_executor", side_effect=AssertionError):
         again = cli("run", *options(place))
     assert time.monotonic() - started < 5
     assert again.code == 0
@@ -267,7 +267,7 @@ def test_nondeterminism_is_6(cli: Cli, trained: Place, finished: Place, plan: Pl
             trained.shared().record([(key, theirs[1] + b" ")])
             return super().next()
 
-    with mock.patch("orchestrator.work.reproduce.open_executor", return_value=Other()):
+    with mock.patch("orchestrator.reproduce.open_executor", return_value=Other()):
         answer = cli("run", *options(trained))
     assert answer.code == 6
     assert f"block {key} was played before with other bytes" in answer.err
@@ -450,7 +450,7 @@ def test_gc(cli: Cli, done: Place, plan: Plan, expected: dict[str, bytes], spec:
     assert answer.out.count("deleted ") == len(before[0]) - len(artifacts) + 2
     assert wanted.is_dir()
     assert not unwanted.exists()
-    with mock.patch("orchestrator.work.reproduce.open_executor", side_effect=AssertionError):
+    with mock.patch("orchestrator.reproduce.open_executor", side_effect=AssertionError):
         assert cli("run", *options(done)).code == 0
     assert promised_bytes(done.out) == expected
     carry_out(changed, serially(other, done.store_root))  # what was deleted is made again

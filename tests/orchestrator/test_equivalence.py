@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from orchestrator import reproduce as reproducing
 from orchestrator.executors.serial import SerialExecutor
+from orchestrator.reproduce import Settings
 from orchestrator.spec.spec import Spec
-from orchestrator.work import reproduce as reproducing
 from orchestrator.work.jobs import Report
 from orchestrator.work.plan import make_plan
-from orchestrator.work.reproduce import Settings
 from tests.orchestrator.tiny import Alone, Lines, Place, carry_out, promised_bytes, serially
 
 METHODS = ("no-stitch", "random-stitch", "mf-stitch", "mb-stitch", "reach-stitch")

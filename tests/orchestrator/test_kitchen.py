@@ -12,13 +12,13 @@ from orchestrator.printing import forecast_lines
 from orchestrator.spec.spec import Spec, load_spec
 from orchestrator.storage.store import Store
 from orchestrator.work.plan import Plan, make_plan
-from stitching.anatomy import START
 from stitching.data.kitchen.demonstrations import KitchenDataConfig
 from stitching.data.kitchen.segments import Order
 from stitching.methods.single_policy import SinglePolicySettings
 from stitching.models.dynamics import DynamicsConfig
 from stitching.models.iql import IQLConfig
 from stitching.planning.cem import CEM
+from stitching.studies.stitches import START
 from tests.orchestrator.tiny import Alone, Place
 
 ORDER: Order = ("microwave", "kettle", "bottom burner", "slide cabinet")

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from analysis.paper import paper_table
+from analysis.paper.numbers import paper_table
 from orchestrator.benchmarks.registry import KITS
 from orchestrator.errors import UsageError
 from orchestrator.spec.spec import Spec, load_spec

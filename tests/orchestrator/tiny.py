@@ -10,9 +10,10 @@ from unittest import mock
 from orchestrator.benchmarks.registry import BENCHMARKS
 from orchestrator.builders.models import load_models
 from orchestrator.executors.serial import SerialExecutor
+from orchestrator.reproduce import Settings, reproduce
 from orchestrator.spec.methods import (
     first_method,
-    method_block,
+    method_env,
     method_name,
     method_of,
     method_rollout,
@@ -24,9 +25,8 @@ from orchestrator.storage.store import Store
 from orchestrator.work.jobs import BuildJob, Job
 from orchestrator.work.plan import Node, Plan
 from orchestrator.work.progress import Silent
-from orchestrator.work.reproduce import Settings, reproduce
 from stitching.models.agent import Agent
-from stitching.rollout import Play, Segments, play_from_start
+from stitching.rollout import Block, Segments, play_from_start
 
 TINY = Path(__file__).with_name("tiny.toml")
 
@@ -155,12 +155,12 @@ class Alone:
         method = method_of(self.method)
         agent = models.one(method.policy, Agent)
         return play_from_start(
-            method_block(self.method, benchmark),
+            method_env(self.method, benchmark),
             agent,
             method.stitcher(spec.method_settings(self.method), models),
             benchmark,
             method_rollout(self.method, spec.rollout),
-            Play(
+            Block(
                 spec.root_seed,
                 spec.benchmark,
                 self.seed,

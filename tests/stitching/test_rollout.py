@@ -19,14 +19,14 @@ import pytest
 from torch import Tensor
 
 from stitching.envs.first_times import FirstTimes
-from stitching.envs.maze import Maze, MazeBlock
-from stitching.envs.protocol import ActionSpace, EpisodeBlock, conditions
+from stitching.envs.maze import Maze, MazeVectorEnv
+from stitching.envs.protocol import ActionSpace, VectorEnv, conditions
 from stitching.methods.no_stitch import NoStitch
 from stitching.methods.protocol import Models, Proposal, Stitcher
 from stitching.methods.random_stitch import RandomStitch, RandomStitchSettings
 from stitching.models.agent import Agent
 from stitching.rollout import (
-    Play,
+    Block,
     RolloutConfig,
     Segments,
     begin,
@@ -48,8 +48,8 @@ each_method = pytest.mark.parametrize("method", METHODS)
 each_reading = pytest.mark.parametrize("config", [SAMPLED, FIRST], ids=["between", "first"])
 
 
-def play_of(method: str, prefix: Sequence[str], episodes: Sequence[int] = range(6)) -> Play:
-    return Play(0, "maze", 0, method, tuple(episodes), tuple(prefix))
+def play_of(method: str, prefix: Sequence[str], episodes: Sequence[int] = range(6)) -> Block:
+    return Block(0, "maze", 0, method, tuple(episodes), tuple(prefix))
 
 
 def raw(segments: Segments) -> dict[str, tuple[str, tuple[int, ...], bytes]]:
@@ -65,9 +65,9 @@ class Log:
     steps: list[tuple[str, list[int], np.ndarray]] = field(default_factory=list)
 
     def step(
-        self, block: EpisodeBlock, rows: np.ndarray, episodes: np.ndarray, skill: int, phase: str
+        self, env: VectorEnv, rows: np.ndarray, episodes: np.ndarray, skill: int, phase: str
     ) -> None:
-        self.steps.append((phase, rows.tolist(), block.snapshot(rows)))
+        self.steps.append((phase, rows.tolist(), env.snapshot(rows)))
 
     def count(self, phase: str, row: int) -> int:
         return sum(row in rows for name, rows, _ in self.steps if name == phase)
@@ -90,43 +90,43 @@ class Tree:
         self, maze: Maze, agent: Agent, stitchers: dict[str, Stitcher], config: RolloutConfig
     ) -> None:
         self.maze, self.agent, self.stitchers, self.config = maze, agent, stitchers, config
-        self.block: EpisodeBlock = maze.block()
-        self.nodes: dict[tuple[str, tuple[str, ...]], tuple[Play, Segments, np.ndarray]] = {}
+        self.env: VectorEnv = maze.vector_env()
+        self.nodes: dict[tuple[str, tuple[str, ...]], tuple[Block, Segments, np.ndarray]] = {}
 
-    def node(self, play: Play, step_limit: int) -> tuple[Play, Segments, np.ndarray]:
+    def node(self, block: Block, step_limit: int) -> tuple[Block, Segments, np.ndarray]:
         """What was played at the node, the outcome, and steps used by each episode since start."""
-        first = len(play.prefix) == 1
-        stitched = self.config.first_stitch and self.stitchers[play.method].before_first
+        first = len(block.prefix) == 1
+        stitched = self.config.first_stitch and self.stitchers[block.method].before_first
         # First skills that are not stitched to: one node for all methods.
-        here = replace(play, method="") if first and not stitched else play
+        here = replace(block, method="") if first and not stitched else block
         key = here.method, here.prefix
         if key in self.nodes:
             return self.nodes[key]
-        used, snapshots = np.zeros(len(play.episodes), dtype=np.int64), None
+        used, snapshots = np.zeros(len(block.episodes), dtype=np.int64), None
         if not first:
             parent, outcome, end_step = self.node(
-                replace(play, prefix=play.prefix[:-1]), step_limit
+                replace(block, prefix=block.prefix[:-1]), step_limit
             )
             survived = outcome.success
             here = replace(here, episodes=tuple(np.array(parent.episodes)[survived].tolist()))
             used = end_step[survived]
             stored = np.ascontiguousarray(outcome.snapshots[survived])
             snapshots = np.frombuffer(stored.tobytes()).reshape(stored.shape)
-        begin(self.block, here, snapshots)
-        stitcher = self.stitchers[play.method] if here.method else NoStitch()
+        begin(self.env, here, snapshots)
+        stitcher = self.stitchers[block.method] if here.method else NoStitch()
         segments = play_segment(
-            self.block, self.agent, stitcher, self.maze, self.config, here, step_limit - used
+            self.env, self.agent, stitcher, self.maze, self.config, here, step_limit - used
         )
         self.nodes[key] = here, segments, used + segments.steps
         return self.nodes[key]
 
-    def task(self, play: Play, step_limit: int) -> list[Segments]:
+    def task(self, block: Block, step_limit: int) -> list[Segments]:
         """The task read off the tree, as far as anyone got."""
         outcome: list[Segments] = []
-        for depth in range(1, len(play.prefix) + 1):
+        for depth in range(1, len(block.prefix) + 1):
             if outcome and not outcome[-1].success.any():
                 break
-            node = self.node(replace(play, prefix=play.prefix[:depth]), step_limit)
+            node = self.node(replace(block, prefix=block.prefix[:depth]), step_limit)
             outcome.append(node[1])
         return outcome
 
@@ -144,11 +144,11 @@ def test_the_tree_gives_the_bytes_of_playing_each_task_alone(
 ) -> None:
     tree = Tree(maze, agent, stitchers, config)
     for task in TASKS:
-        play = play_of(method, task, episodes)
+        block = play_of(method, task, episodes)
         alone = play_from_start(
-            maze.block(), agent, stitchers[method], maze, config, play, STEP_LIMIT
+            maze.vector_env(), agent, stitchers[method], maze, config, block, STEP_LIMIT
         )
-        from_tree = tree.task(play, STEP_LIMIT)
+        from_tree = tree.task(block, STEP_LIMIT)
         assert [raw(s) for s in alone] == [raw(s) for s in from_tree]
 
 
@@ -158,13 +158,13 @@ def test_a_policy_told_of_no_skill_is_played_alike(
     """Its snapshots say what has held, and its goals are reached in more orders than asked."""
     skills = len(maze.skills)
     tree = Tree(maze, unconditioned, stitchers, SAMPLED)
-    tree.block = FirstTimes(maze.block(), skills)
+    tree.env = FirstTimes(maze.vector_env(), skills)
     ahead = 0
     for task in TASKS:
-        play = play_of("no-stitch", task, range(16))
-        block = FirstTimes(maze.block(), skills)
-        alone = play_from_start(block, unconditioned, NoStitch(), maze, SAMPLED, play, STEP_LIMIT)
-        assert [raw(s) for s in alone] == [raw(s) for s in tree.task(play, STEP_LIMIT)]
+        block = play_of("no-stitch", task, range(16))
+        env = FirstTimes(maze.vector_env(), skills)
+        alone = play_from_start(env, unconditioned, NoStitch(), maze, SAMPLED, block, STEP_LIMIT)
+        assert [raw(s) for s in alone] == [raw(s) for s in tree.task(block, STEP_LIMIT)]
         assert len(alone) > 1
         held = alone[0].snapshots[alone[0].success][:, -skills:]
         ahead += int((held.sum(axis=1) > 1).sum())
@@ -183,11 +183,11 @@ def test_a_whole_tree_gives_the_bytes_of_every_task(
             tree.task(play_of(method, prefix), STEP_LIMIT)
     reached = Counter()
     for task in permutations(names, 3):
-        play = play_of(method, task)
+        block = play_of(method, task)
         alone = play_from_start(
-            maze.block(), agent, stitchers[method], maze, SAMPLED, play, STEP_LIMIT
+            maze.vector_env(), agent, stitchers[method], maze, SAMPLED, block, STEP_LIMIT
         )
-        assert [raw(s) for s in alone] == [raw(s) for s in tree.task(play, STEP_LIMIT)]
+        assert [raw(s) for s in alone] == [raw(s) for s in tree.task(block, STEP_LIMIT)]
         reached[len(alone), bool(alone[-1].success.all())] += 1
     assert len(reached) > 1  # tasks ended differently: there was something to confuse
 
@@ -197,9 +197,9 @@ def test_a_first_skill_is_stitched_to_where_the_method_can(
     maze: Maze, agent: Agent, stitchers: dict[str, Stitcher], method: str
 ) -> None:
     def first(config: RolloutConfig) -> Segments:
-        play = play_of(method, TASKS[0][:1], range(12))
+        block = play_of(method, TASKS[0][:1], range(12))
         (segments,) = play_from_start(
-            maze.block(), agent, stitchers[method], maze, config, play, STEP_LIMIT
+            maze.vector_env(), agent, stitchers[method], maze, config, block, STEP_LIMIT
         )
         return segments
 
@@ -215,15 +215,15 @@ def test_a_first_skill_is_stitched_to_where_the_method_can(
 def test_shorter_limits_can_be_read_off_the_longest(
     maze: Maze, agent: Agent, stitchers: dict[str, Stitcher], method: str
 ) -> None:
-    play = play_of(method, TASKS[2], range(12))
+    block = play_of(method, TASKS[2], range(12))
     decided = set()
 
     def end_steps(step_limit: int) -> dict[tuple[int, int], int]:
         """(depth, episode) → the step at which that skill was accomplished."""
         played = play_from_start(
-            maze.block(), agent, stitchers[method], maze, SAMPLED, play, step_limit
+            maze.vector_env(), agent, stitchers[method], maze, SAMPLED, block, step_limit
         )
-        episodes, used, found = np.array(play.episodes), np.zeros(12, dtype=np.int64), {}
+        episodes, used, found = np.array(block.episodes), np.zeros(12, dtype=np.int64), {}
         for depth, segments in enumerate(played):
             used = (used + segments.steps)[segments.success]
             episodes = episodes[segments.success]
@@ -243,14 +243,14 @@ def test_an_episode_does_not_depend_on_its_company(
     maze: Maze, agent: Agent, stitchers: dict[str, Stitcher], method: str
 ) -> None:
     """To the rounding of batched products: bytes are promised for equal blocks alone."""
-    play = play_of(method, TASKS[0], [7, 3, 11])
+    block = play_of(method, TASKS[0], [7, 3, 11])
     together = play_from_start(
-        maze.block(), agent, stitchers[method], maze, SAMPLED, play, STEP_LIMIT
+        maze.vector_env(), agent, stitchers[method], maze, SAMPLED, block, STEP_LIMIT
     )
-    for row, episode in enumerate(play.episodes):
+    for row, episode in enumerate(block.episodes):
         (first, *_) = play_from_start(
-            maze.block(), agent, stitchers[method], maze, SAMPLED,
-            replace(play, episodes=(episode,)), STEP_LIMIT,
+            maze.vector_env(), agent, stitchers[method], maze, SAMPLED,
+            replace(block, episodes=(episode,)), STEP_LIMIT,
         )  # fmt: skip
         for name in ("success", "stitch_steps", "steps", "snapshots"):
             assert np.array_equal(getattr(first, name)[0], getattr(together[0], name)[row]), name
@@ -277,9 +277,9 @@ def test_another_process_gives_the_same_bytes(
     plays = [play_of(method, task) for method in METHODS for task in TASKS[:3]]
     here = [
         play_from_start(
-            maze.block(), agent, stitchers[play.method], maze, SAMPLED, play, STEP_LIMIT
+            maze.vector_env(), agent, stitchers[block.method], maze, SAMPLED, block, STEP_LIMIT
         )
-        for play in plays
+        for block in plays
     ]
     plays_backwards = plays[::-1]  # the order in which a worker gets its work is nobody's promise
     worker = subprocess.run(
@@ -301,17 +301,17 @@ def segment(
     agent: Agent,
     stitcher: Stitcher,
     config: RolloutConfig,
-    play: Play,
+    block: Block,
     budget: Sequence[int],
     cells: np.ndarray,
 ) -> tuple[Segments, Log, np.ndarray]:
-    block, log = maze.block(), Log()
-    begin(block, play, cells)
+    env, log = maze.vector_env(), Log()
+    begin(env, block, cells)
     budget_array = np.array(budget)
     given = budget_array.copy()
-    outcome = play_segment(block, agent, stitcher, maze, config, play, budget_array, log)
+    outcome = play_segment(env, agent, stitcher, maze, config, block, budget_array, log)
     assert np.array_equal(budget_array, given)
-    return outcome, log, block.snapshot(np.arange(len(given)))
+    return outcome, log, env.snapshot(np.arange(len(given)))
 
 
 @each_method
@@ -330,8 +330,8 @@ def test_no_episode_takes_more_than_its_budget(
     stitcher = stitchers[method]
     config = replace(SAMPLED, skill_limit=skill_limit)
     previous = "a" if skill != "a" else "b"
-    play = play_of(method, (previous, skill), range(len(cells)))
-    outcome, log, ends = segment(maze, agent, stitcher, config, play, budget, cells)
+    block = play_of(method, (previous, skill), range(len(cells)))
+    outcome, log, ends = segment(maze, agent, stitcher, config, block, budget, cells)
 
     assert (outcome.steps <= budget).all()
     assert (outcome.stitch_steps <= np.minimum(stitcher.limit, outcome.steps)).all()
@@ -359,7 +359,7 @@ def test_a_task_stays_within_its_step_limit(
     for task in TASKS:
         log = Log()
         played = play_from_start(
-            maze.block(), agent, stitchers[method], maze, SAMPLED, play_of(method, task),
+            maze.vector_env(), agent, stitchers[method], maze, SAMPLED, play_of(method, task),
             step_limit, log,
         )  # fmt: skip
         used = np.zeros(6, dtype=np.int64)
@@ -377,7 +377,7 @@ def test_first_skills_are_not_stitched(
 ) -> None:
     def first(stitcher: Stitcher, name: str) -> Segments:
         (segments,) = play_from_start(
-            maze.block(), agent, stitcher, maze, SAMPLED, play_of(name, ("b",)), STEP_LIMIT
+            maze.vector_env(), agent, stitcher, maze, SAMPLED, play_of(name, ("b",)), STEP_LIMIT
         )
         return segments
 
@@ -392,9 +392,9 @@ def random_stitch(actions: ActionSpace, limit: int) -> RandomStitch:
 
 
 def test_a_limit_of_0_is_no_stitching(maze: Maze, agent: Agent) -> None:
-    play = play_of("any", TASKS[0])
+    block = play_of("any", TASKS[0])
     none, limited = (
-        play_from_start(maze.block(), agent, stitcher, maze, SAMPLED, play, STEP_LIMIT)
+        play_from_start(maze.vector_env(), agent, stitcher, maze, SAMPLED, block, STEP_LIMIT)
         for stitcher in (NoStitch(), random_stitch(maze.actions, limit=0))
     )
     assert [raw(s) for s in none] == [raw(s) for s in limited]
@@ -405,10 +405,10 @@ def test_a_limit_of_0_is_no_stitching(maze: Maze, agent: Agent) -> None:
 def test_watching_changes_nothing(
     maze: Maze, agent: Agent, stitchers: dict[str, Stitcher], method: str
 ) -> None:
-    play = play_of(method, TASKS[2])
+    block = play_of(method, TASKS[2])
     watched, unwatched = (
         play_from_start(
-            maze.block(), agent, stitchers[method], maze, SAMPLED, play, STEP_LIMIT, recorder
+            maze.vector_env(), agent, stitchers[method], maze, SAMPLED, block, STEP_LIMIT, recorder
         )
         for recorder in (Log(), None)
     )
@@ -419,7 +419,7 @@ def test_segments_have_the_declared_types(
     maze: Maze, agent: Agent, stitchers: dict[str, Stitcher]
 ) -> None:
     played = play_from_start(
-        maze.block(), agent, stitchers["mb-stitch"], maze, SAMPLED,
+        maze.vector_env(), agent, stitchers["mb-stitch"], maze, SAMPLED,
         play_of("mb-stitch", TASKS[0]), STEP_LIMIT,
     )  # fmt: skip
     alive = 6
@@ -441,13 +441,13 @@ def test_segments_have_the_declared_types(
 def test_nobody_plays(maze: Maze, agent: Agent, stitchers: dict[str, Stitcher]) -> None:
     for method in METHODS:
         (segments,) = play_from_start(
-            maze.block(), agent, stitchers[method], maze, SAMPLED, play_of(method, TASKS[0], ()),
+            maze.vector_env(), agent, stitchers[method], maze, SAMPLED, play_of(method, TASKS[0], ()),
             STEP_LIMIT,
         )  # fmt: skip
         assert len(segments.success) == 0
-        play = play_of(method, ("a", "b"), ())
+        block = play_of(method, ("a", "b"), ())
         nobody, log, _ = segment(
-            maze, agent, stitchers[method], SAMPLED, play, [], np.zeros((0, 2))
+            maze, agent, stitchers[method], SAMPLED, block, [], np.zeros((0, 2))
         )
         assert len(nobody.success) == 0
         assert log.steps == []
@@ -457,7 +457,7 @@ def test_the_mode_leaves_nothing_to_chance(maze: Maze, agent: Agent) -> None:
     def paths(config: RolloutConfig) -> set[tuple]:
         log = Log()
         play_from_start(
-            maze.block(), agent, NoStitch(), maze, config, play_of("no-stitch", ("c",)),
+            maze.vector_env(), agent, NoStitch(), maze, config, play_of("no-stitch", ("c",)),
             STEP_LIMIT, log,
         )  # fmt: skip
         return {tuple(log.path(row)) for row in range(6)}
@@ -469,8 +469,8 @@ def test_the_mode_leaves_nothing_to_chance(maze: Maze, agent: Agent) -> None:
 # Common random numbers.
 
 
-def keys(play: Play, purpose: str, *, by_method: bool = False) -> list[bytes]:
-    return [stream.bytes(16) for stream in play.streams(purpose, by_method=by_method)]
+def keys(block: Block, purpose: str, *, by_method: bool = False) -> list[bytes]:
+    return [stream.bytes(16) for stream in block.streams(purpose, by_method=by_method)]
 
 
 def test_methods_share_environment_and_policy_but_not_planner_streams() -> None:
@@ -483,20 +483,20 @@ def test_methods_share_environment_and_policy_but_not_planner_streams() -> None:
 
 
 def test_every_episode_of_every_node_has_its_own_streams() -> None:
-    play = play_of("m", ("a", "b"))
+    block = play_of("m", ("a", "b"))
     others = [
-        replace(play, root_seed=1),
-        replace(play, benchmark="kitchen"),
-        replace(play, seed=1),
-        replace(play, prefix=("b", "a")),
-        replace(play, prefix=("a",)),
-        replace(play, prefix=("a", "b", "c")),
-        replace(play, episodes=tuple(range(6, 12))),
+        replace(block, root_seed=1),
+        replace(block, benchmark="kitchen"),
+        replace(block, seed=1),
+        replace(block, prefix=("b", "a")),
+        replace(block, prefix=("a",)),
+        replace(block, prefix=("a", "b", "c")),
+        replace(block, episodes=tuple(range(6, 12))),
     ]
     for settings in ({"purpose": "environment"}, {"purpose": "planner", "by_method": True}):
-        found = [key for p in (play, *others) for key in keys(p, **settings)]
+        found = [key for p in (block, *others) for key in keys(p, **settings)]
         assert len(set(found)) == len(found) == 6 * 8
-    purposes = [key for purpose in ("environment", "policy", "x") for key in keys(play, purpose)]
+    purposes = [key for purpose in ("environment", "policy", "x") for key in keys(block, purpose)]
     assert len(set(purposes)) == 18
 
 
@@ -529,9 +529,9 @@ def test_stitchers_draw_from_the_planner_streams_of_their_method(maze: Maze, age
     cells = np.array([[3.0, 1.0]] * 6)
     for method in ("one", "other"):
         drawn: list[bytes] = []
-        play = play_of(method, ("a", "d"))
-        segment(maze, agent, PlannerRecorder(drawn), SAMPLED, play, [5] * 6, cells)
-        assert drawn == keys(play, "planner", by_method=True)
+        block = play_of(method, ("a", "d"))
+        segment(maze, agent, PlannerRecorder(drawn), SAMPLED, block, [5] * 6, cells)
+        assert drawn == keys(block, "planner", by_method=True)
 
 
 # An open floor. Weights are made by hand: V is a known linear function of the observation, and the
@@ -606,9 +606,9 @@ def on_the_floor(
     skill: str = "corner",
     config: RolloutConfig = MODE,
 ) -> tuple[Segments, Log]:
-    play = play_of("signposts", ("home", skill), range(len(cells)))
+    block = play_of("signposts", ("home", skill), range(len(cells)))
     outcome, log, _ = segment(
-        FLOOR, agent, stitcher, config, play, [budget] * len(cells), np.array(cells, dtype=float)
+        FLOOR, agent, stitcher, config, block, [budget] * len(cells), np.array(cells, dtype=float)
     )
     return outcome, log
 
@@ -823,12 +823,12 @@ def test_the_stop_rule_watches_the_ensemble_value(alpha: float, steps: int) -> N
 def displacements(stitcher: Stitcher, method: str) -> list[list[tuple[int, int]]]:
     """The executed moves of each episode, by a policy of pure chance far from any wall."""
     cells = [(6, col) for col in (5, 6, 7)] * 2
-    play = play_of(method, ("home", "corner"))
-    block, log = MazeBlock(FLOOR), Log()
-    begin(block, play, np.array(cells, dtype=float))
+    block = play_of(method, ("home", "corner"))
+    env, log = MazeVectorEnv(FLOOR), Log()
+    begin(env, block, np.array(cells, dtype=float))
     agent = walker(v_row=[-1.0], move=None)
     config = replace(SAMPLED, skill_limit=6)
-    play_segment(block, agent, stitcher, FLOOR, config, play, np.full(6, 20), log)
+    play_segment(env, agent, stitcher, FLOOR, config, block, np.full(6, 20), log)
     executed = []
     for row in range(6):
         steps = [
@@ -863,8 +863,8 @@ def test_snapshots_are_taken_where_each_episode_stopped() -> None:
 
 def test_a_task_ends_when_nobody_is_left() -> None:
     """From home the policy only goes right: north is never reached, nor anything after it."""
-    play = play_of("no-stitch", ("north", "corner"))
-    played = play_from_start(FLOOR.block(), walker(), NoStitch(), FLOOR, MODE, play, 20)
+    block = play_of("no-stitch", ("north", "corner"))
+    played = play_from_start(FLOOR.vector_env(), walker(), NoStitch(), FLOOR, MODE, block, 20)
     assert len(played) == 1
     assert not played[0].success.any()
     assert (played[0].steps == 20).all()

@@ -8,9 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from orchestrator.reproduce import LazyExecutor
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.work.progress import Silent
-from orchestrator.work.reproduce import LazyExecutor
 from orchestrator.work.worker import use_one_thread
 from sweeps.confirm import confirm_spec
 from sweeps.player import SpecPlayer

@@ -59,7 +59,7 @@ def test_a_search_keeps_its_report(finished: Path) -> None:
 
 def test_every_block_is_played_once(trained: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     executor = Counted()
-    monkeypatch.setattr("orchestrator.work.reproduce.open_executor", lambda *_: executor)
+    monkeypatch.setattr("orchestrator.reproduce.open_executor", lambda *_: executor)
     sweep_in(trained, tiny_sweep())
     assert set(executor.played.values()) == {1}
     assert not executor.built

@@ -5,13 +5,14 @@ from typing import Any, get_args
 
 import pytest
 
-from analysis.paper import paper_scores
-from analysis.rows import place_tasks
-from analysis.run import RunSpec
+from analysis.paper.numbers import paper_scores
+from analysis.schema import RunSpec
+from analysis.tables.rows import place_tasks
 from orchestrator.errors import UsageError
 from orchestrator.spec.spec import TableSpec, load_spec
 from orchestrator.spec.tomls import Scale
 from orchestrator.storage.rundir import describe
+from sweeps.results.table import table_spec
 from sweeps.space import Dimension, replaced
 from sweeps.spec import (
     Confirm,
@@ -21,7 +22,6 @@ from sweeps.spec import (
     packaged_sweeps,
     split_tasks,
 )
-from sweeps.table import table_spec
 from tests.sweeps.tiny import tiny_sweep
 
 ALPHA = "mb_stitch.alpha"

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
+from orchestrator.reproduce import Settings
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.work.progress import Silent
-from orchestrator.work.reproduce import Settings
 from sweeps.spec import SweepSpec, load_sweep
 from sweeps.study import SweepStudy
 from sweeps.sweep import carry_out
@@ -30,7 +30,7 @@ def sweep_in(
     root: Path, sweep: SweepSpec, progress: Silent | None = None, **changes: Any
 ) -> RunDirectory:
     """A whole sweep without figures, which would be most of its time."""
-    with mock.patch("sweeps.report.draw_figures", return_value=[]):
+    with mock.patch("sweeps.results.report.draw_figures", return_value=[]):
         return carry_out(sweep, settings(root, **changes), progress or Silent(), root / "results")
 
 

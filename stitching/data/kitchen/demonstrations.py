@@ -17,7 +17,7 @@ from stitching.data.kitchen.arm import GRIP_OPEN, HOME, Arm
 from stitching.data.kitchen.programs import PROGRAMS, Program, Style, perform, relocate, style
 from stitching.data.kitchen.segments import Episode, Order, Segment, as_transitions, cut
 from stitching.data.transitions import Transitions
-from stitching.envs.kitchen import JOINTS, KITCHEN, SKILLS, KitchenBlock
+from stitching.envs.kitchen import JOINTS, KITCHEN, SKILLS, KitchenVectorEnv
 from stitching.streams import stream
 
 SHORT = {name.split()[0]: name for name in SKILLS}
@@ -127,15 +127,15 @@ class Demonstrator:
         return np.clip(action + noise, -1, 1).astype(np.float32)
 
 
-def demonstrate(block: KitchenBlock, hands: Sequence[Demonstrator]) -> list[Episode]:
+def demonstrate(env: KitchenVectorEnv, hands: Sequence[Demonstrator]) -> list[Episode]:
     """Let each hand go on from its episode's state, until it is done or gives up.
 
     Physics that diverge end their episode before the step that did it.
     """
     arm, rows = Arm(), np.arange(len(hands))
-    seen = [[row] for row in block.observe(rows)]
-    done = [[row] for row in _achieved(block, rows)]
-    states = [[row] for row in block.snapshot(rows)]
+    seen = [[row] for row in env.observe(rows)]
+    done = [[row] for row in _achieved(env, rows)]
+    states = [[row] for row in env.snapshot(rows)]
     acted: list[list[np.ndarray]] = [[] for _ in hands]
     relocating: list[list[bool]] = [[] for _ in hands]
     while len(rows):
@@ -148,13 +148,13 @@ def demonstrate(block: KitchenBlock, hands: Sequence[Demonstrator]) -> list[Epis
         if not moves:
             break
         rows = np.array(list(moves))
-        block.step(rows, np.stack(list(moves.values())))
-        rows = rows[~block.diverged[rows]]
+        env.step(rows, np.stack(list(moves.values())))
+        rows = rows[~env.diverged[rows]]
         after = zip(
             rows.tolist(),
-            block.observe(rows),
-            _achieved(block, rows),
-            block.snapshot(rows),
+            env.observe(rows),
+            _achieved(env, rows),
+            env.snapshot(rows),
             strict=True,
         )
         for row, observation, achieved, state in after:
@@ -175,9 +175,9 @@ def demonstrate(block: KitchenBlock, hands: Sequence[Demonstrator]) -> list[Epis
     ]
 
 
-def _achieved(block: KitchenBlock, rows: np.ndarray) -> np.ndarray:
+def _achieved(env: KitchenVectorEnv, rows: np.ndarray) -> np.ndarray:
     """Which of the goals hold: (n, 7)."""
-    return np.stack([block.achieved(rows, skill) for skill in range(len(SKILLS))], axis=1)
+    return np.stack([env.achieved(rows, skill) for skill in range(len(SKILLS))], axis=1)
 
 
 def orders(config: KitchenDataConfig) -> tuple[Order, ...]:
@@ -196,10 +196,10 @@ def play(
     """
     numbers = range(config.demonstrations(order)) if episodes is None else episodes
     labels = [("demonstrations", "kitchen", seed, "-".join(order), e) for e in numbers]
-    block = KITCHEN.block()
-    block.reset([stream("environment", *label) for label in labels])
+    env = KITCHEN.vector_env()
+    env.reset([stream("environment", *label) for label in labels])
     hands = [Demonstrator(order, config, stream("hand", *label)) for label in labels]
-    return [cut(episode, order) for episode in demonstrate(block, hands)]
+    return [cut(episode, order) for episode in demonstrate(env, hands)]
 
 
 def kept(config: KitchenDataConfig, demonstrations: list[list[Segment]]) -> list[Segment]:

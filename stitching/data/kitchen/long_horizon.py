@@ -48,10 +48,10 @@ def _played(config: KitchenDataConfig, order: Order, seed: int) -> Iterator[Epis
     The arm is never taken elsewhere between two skills: that would be a cut.
     """
     config = replace(config, elsewhere=0.0)
-    block = KITCHEN.block()
+    env = KITCHEN.vector_env()
     for first in range(0, config.episodes, TOGETHER):
         numbers = range(first, min(first + TOGETHER, config.episodes))
         labels = [("long horizon", "kitchen", seed, "-".join(order), e) for e in numbers]
-        block.reset([stream("environment", *label) for label in labels])
+        env.reset([stream("environment", *label) for label in labels])
         hands = [Demonstrator(order, config, stream("hand", *label)) for label in labels]
-        yield from demonstrate(block, hands)
+        yield from demonstrate(env, hands)

@@ -64,24 +64,24 @@ def demonstrate(
     index = skill_index(benchmark, skill)
     numbers = range(config.episodes) if episodes is None else episodes
     labels = [("demonstrations", benchmark.name, seed, skill, int(number)) for number in numbers]
-    block = starts(benchmark, index).block()
-    block.reset([stream("environment", *label) for label in labels])
+    env = starts(benchmark, index).vector_env()
+    env.reset([stream("environment", *label) for label in labels])
     manner = style(config.quality)
     hands = [Hand(skill, benchmark.workspace, manner, stream("hand", *label)) for label in labels]
     rows = np.arange(len(hands))
-    snapshots = block.snapshot(rows)
-    seen = [[observation] for observation in block.observe(rows)]
+    snapshots = env.snapshot(rows)
+    seen = [[observation] for observation in env.observe(rows)]
     acted: list[list[np.ndarray]] = [[] for _ in hands]
     success = np.zeros(len(hands), dtype=bool)
     for _ in range(config.skill_steps):
         actions = np.array([hands[row].act(seen[row][-1]) for row in rows])
-        block.step(rows, actions)
-        sound = ~block.diverged[rows]
+        env.step(rows, actions)
+        sound = ~env.diverged[rows]
         rows, actions = rows[sound], actions[sound]
-        for row, action, observation in zip(rows, actions, block.observe(rows), strict=True):
+        for row, action, observation in zip(rows, actions, env.observe(rows), strict=True):
             acted[row].append(action)
             seen[row].append(observation)
-        success[rows] = block.achieved(rows, index)
+        success[rows] = env.achieved(rows, index)
         rows = rows[~success[rows]]
         if not len(rows):
             break

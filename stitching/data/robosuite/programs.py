@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stitching.envs.robosuite.block import GRIP_POSITION, TURN
 from stitching.envs.robosuite.can import CAN_POSITION
 from stitching.envs.robosuite.door import DOOR_POSITION, HANDLE_POSITION, HANDLE_TURN
+from stitching.envs.robosuite.vector_env import GRIP_POSITION, TURN
 
 OPEN, CLOSED = -1.0, 1.0  # the fingers
 

@@ -21,7 +21,7 @@ from stitching.envs.robosuite.door import DOOR, Door
 from stitching.methods.no_stitch import NoStitch
 from stitching.models.agent import Agent
 from stitching.models.iql import IQLConfig, train_single_tasks
-from stitching.rollout import Play, RolloutConfig, play_from_start, play_segment
+from stitching.rollout import Block, RolloutConfig, play_from_start, play_segment
 
 
 @dataclass(frozen=True)
@@ -52,15 +52,15 @@ def policy_rates(
     episodes, rollout = tuple(range(config.trials)), RolloutConfig()
     own = {}
     for skill in dict.fromkeys(task):
-        play = Play(0, benchmark.name, seed, "", episodes, (skill,))
-        block = starts(benchmark, skill_index(benchmark, skill)).block()
-        block.reset(play.streams("own starts"))
+        block = Block(0, benchmark.name, seed, "", episodes, (skill,))
+        env = starts(benchmark, skill_index(benchmark, skill)).vector_env()
+        env.reset(block.streams("own starts"))
         budget = np.full(config.trials, config.step_limit)
-        segments = play_segment(block, agent, NoStitch(), benchmark, rollout, play, budget)
+        segments = play_segment(env, agent, NoStitch(), benchmark, rollout, block, budget)
         own[skill] = int(segments.success.sum()), config.trials
-    whole = Play(0, benchmark.name, seed, "", episodes, task)
+    whole = Block(0, benchmark.name, seed, "", episodes, task)
     outcome = play_from_start(
-        benchmark.block(), agent, NoStitch(), benchmark, rollout, whole, config.step_limit
+        benchmark.vector_env(), agent, NoStitch(), benchmark, rollout, whole, config.step_limit
     )
     second = outcome[1].success if len(outcome) > 1 else np.zeros(0, dtype=bool)
     wins, reached = int(second.sum()), len(second)

@@ -9,15 +9,15 @@ import mujoco
 import numpy as np
 
 from stitching.envs.protocol import ActionSpace, Skill
-from stitching.envs.robosuite.block import (
+from stitching.envs.robosuite.models import ArmModel, arm_model
+from stitching.envs.robosuite.vector_env import (
     ACTION_SIZE,
     FACTORS,
     GRIP_POSITION,
     OBSERVATION_SIZE,
-    RobosuiteBlock,
+    RobosuiteVectorEnv,
     sizes,
 )
-from stitching.envs.robosuite.models import ArmModel, arm_model
 
 CAN_POSE, CAN_SPEED = slice(9, 16), slice(9, 15)  # in positions (m, w x y z) and velocities
 
@@ -75,8 +75,8 @@ class Can:
     def snapshot_size(self) -> int:
         return sizes(self.arm.mujoco, self.fixture_size)[1]
 
-    def block(self) -> RobosuiteBlock:
-        return RobosuiteBlock(self)
+    def vector_env(self) -> RobosuiteVectorEnv:
+        return RobosuiteVectorEnv(self)
 
     def start(self, data: mujoco.MjData, rng: np.random.Generator) -> np.ndarray:
         data.qpos[CAN_POSE] = can_pose(rng)

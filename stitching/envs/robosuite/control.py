@@ -1,7 +1,7 @@
 """Operational-space control of the gripper's pose (Khatib 1987), as robosuite's OSC_POSE has it.
 
 Its defaults for the Panda: fixed gains, position and orientation decoupled, no interpolation, the
-redundant joint drawn towards the posture the episode began in. All episodes of a block at once.
+redundant joint drawn towards the posture the episode began in. All episodes at once.
 """
 
 from __future__ import annotations

@@ -9,14 +9,14 @@ import mujoco
 import numpy as np
 
 from stitching.envs.protocol import ActionSpace, Skill
-from stitching.envs.robosuite.block import (
+from stitching.envs.robosuite.models import ArmModel, arm_model
+from stitching.envs.robosuite.vector_env import (
     ACTION_SIZE,
     FACTORS,
     OBSERVATION_SIZE,
-    RobosuiteBlock,
+    RobosuiteVectorEnv,
     sizes,
 )
-from stitching.envs.robosuite.models import ArmModel, arm_model
 
 SKILLS = ("open door", "close door")
 # rad: open above the one, as robosuite says; closed below the other, which is ours. A door merely
@@ -72,8 +72,8 @@ class Door:
     def snapshot_size(self) -> int:
         return sizes(self.arm.mujoco, self.fixture_size)[1]
 
-    def block(self) -> RobosuiteBlock:
-        return RobosuiteBlock(self)
+    def vector_env(self) -> RobosuiteVectorEnv:
+        return RobosuiteVectorEnv(self)
 
     @cached_property
     def _views(self) -> tuple[np.ndarray, np.ndarray]:

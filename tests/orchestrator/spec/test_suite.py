@@ -12,6 +12,7 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.errors import ChangedError, IncompleteError, LockedError, UsageError
+from orchestrator.reproduce_suite import reproduce_suite
 from orchestrator.spec.spec import TableSpec
 from orchestrator.spec.structure import to_plain
 from orchestrator.spec.suite import Suite, load_asked, part_directory
@@ -26,7 +27,6 @@ from orchestrator.storage.merge import (
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.work import playing
 from orchestrator.work.progress import Silent
-from orchestrator.work.reproduce_suite import reproduce_suite
 from tests.orchestrator.tiny import TINY, promised_bytes, serially
 
 SUITE = Path(__file__).parents[1] / "suite.toml"
@@ -143,13 +143,13 @@ def test_again_does_nothing(done: Path) -> None:
     carry_out(levels(), done)  # a copy: its store is another
     files = [file for file in (done / "out").rglob("*.*") if "ledger" not in file.name]
     before = {file: file.stat().st_mtime_ns for file in files}
-    with mock.patch("orchestrator.work.reproduce.open_executor", side_effect=AssertionError):
+    with mock.patch("orchestrator.reproduce.open_executor", side_effect=AssertionError):
         carry_out(levels(), done)
     assert {file: file.stat().st_mtime_ns for file in files} == before
 
 
 def test_stopped_between_parts(finished: Path, tmp_path: Path) -> None:
-    import orchestrator.work.reproduce_suite as carrying
+    import orchestrator.reproduce_suite as carrying
 
     reproduce, calls = carrying.reproduce, []
 

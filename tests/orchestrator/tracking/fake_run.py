@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.run import RunSpec
-from analysis.tables import build_table
-from analysis.writers import to_csv
+from analysis.schema import RunSpec
+from analysis.tables.table import build_table
+from analysis.tables.writers import to_csv
 from orchestrator.tracking.views import METHOD, RUN_ID, SEED
 
 SKILLS = ["g0", "g1", "g2"]

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from orchestrator import reproduce as reproducing
 from orchestrator.errors import BadDataError, ChangedError, IncompleteError
 from orchestrator.executors.serial import SerialExecutor
 from orchestrator.spec.spec import Spec
 from orchestrator.storage.store import Artifact
-from orchestrator.work import reproduce as reproducing
 from orchestrator.work.building import Builds
 from orchestrator.work.checkpoints import CheckpointFile
 from orchestrator.work.jobs import ATTEMPTS, BuildJob, Job, Report

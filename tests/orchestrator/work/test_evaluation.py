@@ -13,7 +13,7 @@ from orchestrator.work import playing
 from orchestrator.work.evaluation import Evaluation
 from orchestrator.work.jobs import ATTEMPTS, Job, PlayJob, Report
 from orchestrator.work.plan import Node, Plan
-from stitching.rollout import Play
+from stitching.rollout import Block
 from tests.orchestrator.tiny import Counted, Lines, Place, promised_bytes
 
 
@@ -47,11 +47,11 @@ def break_blocks(monkeypatch: pytest.MonkeyPatch) -> Break:
     """Make blocks raise while they are played: those a condition holds for, so many times."""
     play_segment = playing.play_segment
 
-    def break_blocks(broken: Callable[[Play], bool], times: int = 10**9) -> None:
-        left = Counter[Play]()
+    def break_blocks(broken: Callable[[Block], bool], times: int = 10**9) -> None:
+        left = Counter[Block]()
 
         def faulty(block: object, agent: object, stitcher: object, *rest: object) -> object:
-            play = next(item for item in rest if isinstance(item, Play))
+            play = next(item for item in rest if isinstance(item, Block))
             left[play] += 1
             if broken(play) and left[play] <= times:
                 raise RuntimeError("the simulator fell over")

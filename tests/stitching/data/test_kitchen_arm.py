@@ -18,24 +18,24 @@ def test_level_hand_points_away_with_its_fingers_side_by_side() -> None:
 
 
 def test_the_hand_reaches_a_pose_and_stays_there() -> None:
-    block, arm = KITCHEN.block(), Arm()
-    block.reset([stream("arm", 0)])
-    arm.see(block.observe(ROW)[0])
+    env, arm = KITCHEN.vector_env(), Arm()
+    env.reset([stream("arm", 0)])
+    arm.see(env.observe(ROW)[0])
     position, turn = arm.position + np.array([0.1, 0.15, 0.1]), hand_turn(0.2, 0.2, 0.0)
     for _ in range(40):
         action = arm.reach(position, turn, 0.09, GRIP_OPEN)
         assert np.abs(action).max() <= 1
-        block.step(ROW, action.astype(np.float32)[None])
-        arm.see(block.observe(ROW)[0])
+        env.step(ROW, action.astype(np.float32)[None])
+        arm.see(env.observe(ROW)[0])
     assert np.linalg.norm(arm.position - position) < 0.01
     assert (turn * arm.turn.inv()).magnitude() < 0.05
 
 
 def test_the_arm_holds_its_weight() -> None:
-    block, arm = KITCHEN.block(), Arm()
-    block.reset([stream("arm", 0)])
+    env, arm = KITCHEN.vector_env(), Arm()
+    env.reset([stream("arm", 0)])
     for _ in range(20):
-        arm.see(block.observe(ROW)[0])
+        arm.see(env.observe(ROW)[0])
         action = arm.bend(HOME - arm.joints, GRIP_OPEN)
-        block.step(ROW, action.astype(np.float32)[None])
-    assert np.abs(block.positions(ROW)[0, :7] - HOME).max() < 0.02
+        env.step(ROW, action.astype(np.float32)[None])
+    assert np.abs(env.positions(ROW)[0, :7] - HOME).max() < 0.02

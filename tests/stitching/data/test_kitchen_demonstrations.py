@@ -115,10 +115,10 @@ def test_held_out_skills_begin_where_their_snapshots_are(monkeypatch: pytest.Mon
     monkeypatch.setattr("stitching.data.kitchen.demonstrations.orders", lambda config: alone)
     data, starts = held_out(config, seed=0)
     assert [SKILLS[skill] for skill in data.episode_skills] == ["kettle", "microwave"]
-    block = KITCHEN.block()
-    block.restore(starts, [np.random.default_rng(0), np.random.default_rng(1)])
+    env = KITCHEN.vector_env()
+    env.restore(starts, [np.random.default_rng(0), np.random.default_rng(1)])
     first = data.observations[data.episode_starts]
-    assert np.array_equal(block.observe(np.arange(2)), first)
+    assert np.array_equal(env.observe(np.arange(2)), first)
     seen = collect(config, [("kettle",)], seed=0)
     assert not (seen.observations == first[0]).all(axis=1).any()
 

@@ -75,11 +75,11 @@ def test_out_of_reach_is_infinite() -> None:
 def test_every_transition_is_the_environments(source: str, request: pytest.FixtureRequest) -> None:
     data: Transitions = request.getfixturevalue(source)
     check(data, MAZE, source)
-    block, rows = MAZE.block(), np.arange(len(data))
-    block.restore(np.array(cells(MAZE, data.observations), dtype=float), [])
-    assert block.observe(rows).tobytes() == data.observations.tobytes()
-    block.step(rows, data.actions)
-    assert block.observe(rows).tobytes() == data.next_observations.tobytes()
+    env, rows = MAZE.vector_env(), np.arange(len(data))
+    env.restore(np.array(cells(MAZE, data.observations), dtype=float), [])
+    assert env.observe(rows).tobytes() == data.observations.tobytes()
+    env.step(rows, data.actions)
+    assert env.observe(rows).tobytes() == data.next_observations.tobytes()
 
 
 @pytest.mark.parametrize("source", ["demonstrations", "explored"])

@@ -18,9 +18,9 @@ from stitching.data.robosuite.demonstrations import (
 from stitching.data.robosuite.programs import PROGRAMS, Hand, object_frame, style
 from stitching.data.transitions import DataError, check
 from stitching.envs.protocol import skill_index
-from stitching.envs.robosuite.block import GRIP_POSITION
 from stitching.envs.robosuite.can import CAN, Can
 from stitching.envs.robosuite.door import DOOR, HANDLE_TURN, HINGE, OPEN, Door
+from stitching.envs.robosuite.vector_env import GRIP_POSITION
 from stitching.streams import stream
 
 EPISODES = 5
@@ -102,7 +102,7 @@ def test_demonstrations_end_with_success() -> None:
 
 
 def test_the_handles_frame_follows_the_door_and_not_the_handle() -> None:
-    at_rest = DOOR.block()
+    at_rest = DOOR.vector_env()
     at_rest.reset([stream("frame")])
     snapshot = at_rest.snapshot(ROW)
     frames = []
@@ -121,15 +121,15 @@ def test_the_handles_frame_follows_the_door_and_not_the_handle() -> None:
 def test_a_hand_that_has_lost_its_hold_begins_again(skill: str) -> None:
     """What it shows follows from what it sees, else nobody could learn it."""
     benchmark = BENCHMARK[skill]
-    block = starts(benchmark, skill_index(benchmark, skill)).block()
-    block.reset([stream("hand")])
+    env = starts(benchmark, skill_index(benchmark, skill)).vector_env()
+    env.reset([stream("hand")])
     hand = Hand(skill, benchmark.workspace, style(EXPERT), stream("draws"))
     closed = 0
     while closed < 4:  # two actions to take hold, and two more with it
-        action = hand.act(block.observe(ROW)[0])
+        action = hand.act(env.observe(ROW)[0])
         closed += action[4] > 0
-        block.step(ROW, action[None])
-    seen = block.observe(ROW)[0]
+        env.step(ROW, action[None])
+    seen = env.observe(ROW)[0]
     holding = deepcopy(hand).act(seen)
     seen[GRIP_POSITION] += [0.06, 0.06, 0.06]
     *_, fingers = hand.act(seen)

@@ -6,10 +6,10 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from stitching.envs.robosuite.block import AHEAD, CONTROL_STEPS, NEAR, STRIDE, TURN
 from stitching.envs.robosuite.can import Can
 from stitching.envs.robosuite.door import Door
 from stitching.envs.robosuite.models import original
+from stitching.envs.robosuite.vector_env import AHEAD, CONTROL_STEPS, NEAR, STRIDE, TURN
 
 TASKS = {"robosuite-door": "Door", "robosuite-can": "PickPlaceCan"}
 

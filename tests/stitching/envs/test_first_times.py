@@ -43,16 +43,16 @@ def accomplished(task: Iterable[int], scene: Iterable[Iterable[int]]) -> int:
 
     scene: the goals that hold after each step.
     """
-    block = FirstTimes(Goals(), SKILLS)
-    block.reset(NO_STREAM)
+    env = FirstTimes(Goals(), SKILLS)
+    env.reset(NO_STREAM)
     steps = iter(scene)
     for count, skill in enumerate(task):
-        while not block.achieved(ONE, skill).any():
+        while not env.achieved(ONE, skill).any():
             goals = next(steps, None)
             if goals is None:
                 return count
-            block.step(ONE, np.isin(np.arange(SKILLS), list(goals))[None].astype(float))
-        block.restore(block.snapshot(ONE), NO_STREAM)
+            env.step(ONE, np.isin(np.arange(SKILLS), list(goals))[None].astype(float))
+        env.restore(env.snapshot(ONE), NO_STREAM)
     return count + 1
 
 
@@ -75,16 +75,16 @@ def test_what_counts(task: tuple[int, ...], scene: list[set[int]], counted: int)
 
 def test_a_goal_that_holds_at_the_start_is_never_achieved() -> None:
     goals = Goals()
-    block = FirstTimes(goals, SKILLS)
+    env = FirstTimes(goals, SKILLS)
     goals.reset = lambda streams: goals.step(ONE, np.array([[1.0, 0.0, 0.0]]))  # type: ignore[method-assign]
-    block.reset(NO_STREAM)
-    block.step(ONE, np.array([[1.0, 1.0, 0.0]]))
-    assert [bool(block.achieved(ONE, skill)[0]) for skill in range(SKILLS)] == [False, True, False]
+    env.reset(NO_STREAM)
+    env.step(ONE, np.array([[1.0, 1.0, 0.0]]))
+    assert [bool(env.achieved(ONE, skill)[0]) for skill in range(SKILLS)] == [False, True, False]
 
 
 def test_snapshots_end_with_what_has_held() -> None:
-    block = FirstTimes(Goals(), SKILLS)
-    block.reset(NO_STREAM)
+    env = FirstTimes(Goals(), SKILLS)
+    env.reset(NO_STREAM)
     for goals in ([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]):
-        block.step(ONE, np.array([goals]))
-    np.testing.assert_array_equal(block.snapshot(ONE), [[0, 0, 1, 1, 0, 1]])
+        env.step(ONE, np.array([goals]))
+    np.testing.assert_array_equal(env.snapshot(ONE), [[0, 0, 1, 1, 0, 1]])

@@ -29,7 +29,7 @@ from stitching.envs.kitchen import (
     SEEN,
     SKILLS,
     Kitchen,
-    KitchenBlock,
+    KitchenVectorEnv,
     goal_distances,
     kitchen_model,
 )
@@ -106,8 +106,8 @@ def noise(use: str = "ride") -> list[np.random.Generator]:
     return [stream("kitchen", use, skill) for skill in SKILLS]
 
 
-def achievements(block: KitchenBlock, rows: np.ndarray) -> np.ndarray:
-    return np.stack([block.achieved(rows, skill) for skill in range(len(SKILLS))], axis=1)
+def achievements(env: KitchenVectorEnv, rows: np.ndarray) -> np.ndarray:
+    return np.stack([env.achieved(rows, skill) for skill in range(len(SKILLS))], axis=1)
 
 
 def touches(positions: np.ndarray) -> int:
@@ -120,21 +120,21 @@ def touches(positions: np.ndarray) -> int:
 
 @pytest.fixture(scope="module")
 def ride() -> Ride:
-    block, streams = KITCHEN.block(), noise()
-    block.reset(streams)
-    actions, snapshots, kept = [], [block.snapshot(ROWS)], {}
-    achieved = [achievements(block, ROWS)]
-    contacts = [[touches(row) for row in block.positions(ROWS)]]
+    env, streams = KITCHEN.vector_env(), noise()
+    env.reset(streams)
+    actions, snapshots, kept = [], [env.snapshot(ROWS)], {}
+    achieved = [achievements(env, ROWS)]
+    contacts = [[touches(row) for row in env.positions(ROWS)]]
     for step in range(STEPS):
         if step in BOUNDARIES:
             kept[step] = copy.deepcopy(streams)
-        hands = zip(block.positions(ROWS), SKILLS, strict=True)
+        hands = zip(env.positions(ROWS), SKILLS, strict=True)
         actions.append(np.stack([restless_hand(row, skill, step) for row, skill in hands]))
-        block.step(ROWS, actions[-1])
-        snapshots.append(block.snapshot(ROWS))
-        achieved.append(achievements(block, ROWS))
-        contacts.append([touches(row) for row in block.positions(ROWS)])
-    assert not block.diverged.any()
+        env.step(ROWS, actions[-1])
+        snapshots.append(env.snapshot(ROWS))
+        achieved.append(achievements(env, ROWS))
+        contacts.append([touches(row) for row in env.positions(ROWS)])
+    assert not env.diverged.any()
     return Ride(
         np.array(actions), np.array(snapshots), np.array(achieved), np.array(contacts), kept
     )
@@ -194,11 +194,11 @@ def test_the_ride_is_worth_comparing(ride: Ride) -> None:
 
 @pytest.mark.parametrize("boundary", BOUNDARIES)
 def test_snapshots_continue_exactly_amid_contacts(ride: Ride, boundary: int) -> None:
-    block = KITCHEN.block()
-    block.restore(ride.snapshots[boundary], copy.deepcopy(ride.streams[boundary]))
+    env = KITCHEN.vector_env()
+    env.restore(ride.snapshots[boundary], copy.deepcopy(ride.streams[boundary]))
     for step in range(boundary, boundary + 40):
-        assert block.snapshot(ROWS).tobytes() == ride.snapshots[step].tobytes(), f"step {step}"
-        block.step(ROWS, ride.actions[step])
+        assert env.snapshot(ROWS).tobytes() == ride.snapshots[step].tobytes(), f"step {step}"
+        env.step(ROWS, ride.actions[step])
 
 
 @pytest.mark.parametrize("part", PARTS)
@@ -210,11 +210,11 @@ def test_no_part_of_a_snapshot_can_be_left_out(ride: Ride, part: str) -> None:
         snapshots = ride.snapshots[boundary].copy()
         if left_out:
             snapshots[:, PARTS[part]] = ride.snapshots[0][:, PARTS[part]]  # the start's instead
-        block = KITCHEN.block()
-        block.restore(snapshots, copy.deepcopy(ride.streams[boundary]))
-        seen = block.observe(touching)
-        block.step(ROWS, ride.actions[boundary])
-        noticed.append(np.c_[seen, block.snapshot(touching)])
+        env = KITCHEN.vector_env()
+        env.restore(snapshots, copy.deepcopy(ride.streams[boundary]))
+        seen = env.observe(touching)
+        env.step(ROWS, ride.actions[boundary])
+        noticed.append(np.c_[seen, env.snapshot(touching)])
     assert (noticed[0] != noticed[1]).any(axis=1).all()
 
 
@@ -228,12 +228,12 @@ def test_a_fresh_stream_blurs_from_the_next_step_on(ride: Ride) -> None:
     boundary = BOUNDARIES[0]
     scenes = []
     for use in ("one", "another"):
-        block, streams = KITCHEN.block(), noise(use)
-        block.restore(ride.snapshots[boundary], streams)
+        env, streams = KITCHEN.vector_env(), noise(use)
+        env.restore(ride.snapshots[boundary], streams)
         assert [a.random() for a in streams] == [b.random() for b in noise(use)]  # none was drawn
-        before = block.observe(ROWS)
-        block.step(ROWS, ride.actions[boundary])
-        scenes.append((before, block.positions(ROWS), block.observe(ROWS)))
+        before = env.observe(ROWS)
+        env.step(ROWS, ride.actions[boundary])
+        scenes.append((before, env.positions(ROWS), env.observe(ROWS)))
     before, after, seen_after = (np.stack(pair) for pair in zip(*scenes, strict=True))
     assert before[0].tobytes() == before[1].tobytes()
     assert before[0].tobytes() == ride.snapshots[boundary][:, SEEN_AT].astype(np.float32).tobytes()
@@ -243,21 +243,22 @@ def test_a_fresh_stream_blurs_from_the_next_step_on(ride: Ride) -> None:
 
 def test_what_was_seen_steers() -> None:
     """Position targets are counted from the noisy positions, so noise moves the arm."""
-    sharp, blurred = Kitchen(robot_noise_ratio=0).block(), Kitchen(robot_noise_ratio=0.5).block()
-    for block in (sharp, blurred):
-        block.reset(noise()[:1])
-        block.step(ROWS[:1], np.zeros((1, 9), dtype=np.float32))
+    sharp = Kitchen(robot_noise_ratio=0).vector_env()
+    blurred = Kitchen(robot_noise_ratio=0.5).vector_env()
+    for env in (sharp, blurred):
+        env.reset(noise()[:1])
+        env.step(ROWS[:1], np.zeros((1, 9), dtype=np.float32))
     gap = np.abs(sharp.positions(ROWS[:1]) - blurred.positions(ROWS[:1]))
     assert gap[0, :7].max() > 1e-3
     assert gap[0, 9:23].max() < 1e-9
 
 
 def test_without_noise_the_state_itself_is_seen(ride: Ride) -> None:
-    block = Kitchen(robot_noise_ratio=0, object_noise_ratio=0).block()
-    block.restore(ride.snapshots[BOUNDARIES[0]], noise())
-    block.step(ROWS, ride.actions[0])
-    state = block.snapshot(ROWS)[:, :59]
-    np.testing.assert_array_equal(block.observe(ROWS), state[:, SEEN].astype(np.float32))
+    env = Kitchen(robot_noise_ratio=0, object_noise_ratio=0).vector_env()
+    env.restore(ride.snapshots[BOUNDARIES[0]], noise())
+    env.step(ROWS, ride.actions[0])
+    state = env.snapshot(ROWS)[:, :59]
+    np.testing.assert_array_equal(env.observe(ROWS), state[:, SEEN].astype(np.float32))
 
 
 def test_skills_and_goals_are_the_originals() -> None:
@@ -295,9 +296,9 @@ def test_a_goal_does_not_hold_at_its_very_edge(ride: Ride) -> None:
     edge = 0.07
     assert goal - edge == GOAL_RADIUS  # to the last bit
     snapshots[:, where] = [[edge], [edge + 1e-15]]
-    block = KITCHEN.block()
-    block.restore(snapshots, noise()[:2])
-    assert block.achieved(ROWS[:2], slide).tolist() == [False, True]
+    env = KITCHEN.vector_env()
+    env.restore(snapshots, noise()[:2])
+    assert env.achieved(ROWS[:2], slide).tolist() == [False, True]
 
 
 def test_goals_are_judged_without_noise_and_without_memory(ride: Ride) -> None:
@@ -305,11 +306,11 @@ def test_goals_are_judged_without_noise_and_without_memory(ride: Ride) -> None:
     where, goal = GOALS["microwave"]
     snapshots[0, where], snapshots[1, SEEN_AT] = goal, 0
     snapshots[1, PHYSICS_SIZE + 18 - 9 + where.start] = goal[0]  # merely seen there
-    block, microwave = KITCHEN.block(), SKILLS.index("microwave")
-    block.restore(snapshots, noise())
-    assert block.achieved(ROWS, microwave).tolist() == [True] + [False] * 6
-    block.restore(ride.snapshots[0], noise())
-    assert not block.achieved(ROWS, microwave).any()
+    env, microwave = KITCHEN.vector_env(), SKILLS.index("microwave")
+    env.restore(snapshots, noise())
+    assert env.achieved(ROWS, microwave).tolist() == [True] + [False] * 6
+    env.restore(ride.snapshots[0], noise())
+    assert not env.achieved(ROWS, microwave).any()
 
 
 def test_blocks_share_one_model() -> None:
@@ -343,7 +344,7 @@ def test_an_episode_that_diverges_ends_alone(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     others, dead, microwave = np.array([0, 2, 3, 4, 5, 6]), np.array([1]), SKILLS.index("microwave")
-    broken, sound = KITCHEN.block(), KITCHEN.block()
+    broken, sound = KITCHEN.vector_env(), KITCHEN.vector_env()
     broken.restore(diverging(ride, joint, speed), noise())
     sound.restore(ride.snapshots[0], noise())
     last_seen = broken.observe(dead)
@@ -376,35 +377,35 @@ def test_numbers_gone_bad_in_the_last_substep_are_noticed(
     bad: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of which MuJoCo would warn in the next step only."""
-    block, real_step = KITCHEN.block(), mujoco.mj_step
-    block.reset(noise())
-    last_seen = block.observe(ROWS)
+    env, real_step = KITCHEN.vector_env(), mujoco.mj_step
+    env.reset(noise())
+    last_seen = env.observe(ROWS)
     stepped = []
 
     def step(model: mujoco.MjModel, data: mujoco.MjData, nstep: int) -> None:
         real_step(model, data, nstep=nstep)
-        stepped.append(block._pool.index(data))
+        stepped.append(env._pool.index(data))
         if stepped[-1] == 2:
             data.qvel[28] = bad
 
     monkeypatch.setattr(mujoco, "mj_step", step)
     for _ in range(2):
-        block.step(ROWS, np.zeros((7, 9), dtype=np.float32))
+        env.step(ROWS, np.zeros((7, 9), dtype=np.float32))
     assert stepped == [0, 1, 2, 3, 4, 5, 6, 0, 1, 3, 4, 5, 6]  # it would cost seconds a step
-    assert np.flatnonzero(block.diverged).tolist() == [2]
-    np.testing.assert_array_equal((block.observe(ROWS) == last_seen).all(axis=1), block.diverged)
+    assert np.flatnonzero(env.diverged).tolist() == [2]
+    np.testing.assert_array_equal((env.observe(ROWS) == last_seen).all(axis=1), env.diverged)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_a_broken_action_is_refused(bad: float) -> None:
-    block = KITCHEN.block()
-    block.reset(noise())
-    before = block.snapshot(ROWS)
+    env = KITCHEN.vector_env()
+    env.reset(noise())
+    before = env.snapshot(ROWS)
     actions = np.zeros((7, 9), dtype=np.float32)
     actions[3, 4] = bad
     with pytest.raises(ValueError, match="action is not finite"):
-        block.step(ROWS, actions)
-    assert block.snapshot(ROWS).tobytes() == before.tobytes()
+        env.step(ROWS, actions)
+    assert env.snapshot(ROWS).tobytes() == before.tobytes()
 
 
 @dataclass(frozen=True)
@@ -437,20 +438,20 @@ def test_human_episodes_are_seen_as_recorded_until_something_is_touched(
     episodes: Episodes,
 ) -> None:
     """The kettle aside: recorded with another MuJoCo, it settles 1 mm lower there."""
-    block, rows = KITCHEN.block(), np.arange(len(episodes.length))
-    block.reset(episodes.streams())
+    env, rows = KITCHEN.vector_env(), np.arange(len(episodes.length))
+    env.reset(episodes.streams())
     all_but_kettle = np.r_[0:32, 39:53]
     for step in range(20):
-        gap = block.observe(rows) - episodes.observations[episodes.first + step]
+        gap = env.observe(rows) - episodes.observations[episodes.first + step]
         assert np.abs(gap[:, all_but_kettle]).max() < 1e-6, f"step {step}"
-        block.step(rows, episodes.actions[episodes.first + step])
+        env.step(rows, episodes.actions[episodes.first + step])
 
 
 @human
 def test_human_episodes_achieve_their_tasks_when_they_did(episodes: Episodes) -> None:
     episodes = episodes.some(6)  # for the sake of time; all 14 do
-    block = KITCHEN.block()
-    block.reset(episodes.streams())
+    env = KITCHEN.vector_env()
+    env.reset(episodes.streams())
     ours = np.full((len(episodes.length), len(HUMAN_SKILLS)), -1)
     recorded = ours.copy()
     for step in range(episodes.length.max()):
@@ -460,10 +461,10 @@ def test_human_episodes_achieve_their_tasks_when_they_did(episodes: Episodes) ->
         seen = episodes.observations[at].astype(np.float64)[:, np.r_[0:9, 18:39]]
         for column, skill in enumerate(HUMAN_SKILLS):
             near = goal_distances(seen, skill) < GOAL_RADIUS
-            for times, holds in ((ours, block.achieved(rows, skill)), (recorded, near)):
+            for times, holds in ((ours, env.achieved(rows, skill)), (recorded, near)):
                 first_time = rows[holds & (times[rows, column] < 0)]
                 times[first_time, column] = step
-        block.step(rows, episodes.actions[at])
+        env.step(rows, episodes.actions[at])
     assert (recorded > 0).all()
     assert (ours > 0).all()
     assert np.abs(ours - recorded).max() <= 2
@@ -473,13 +474,13 @@ def test_human_episodes_achieve_their_tasks_when_they_did(episodes: Episodes) ->
 def test_a_human_episode_equals_the_originals(episodes: Episodes, original: KitchenEnv) -> None:
     actions = episodes.actions[: episodes.length[0]]
     scenes, achieved = played_by(original, episodes.streams()[0], actions)
-    block, row = KITCHEN.block(), ROWS[:1]
-    block.reset(episodes.streams()[:1])
+    env, row = KITCHEN.vector_env(), ROWS[:1]
+    env.reset(episodes.streams()[:1])
     for step, action in enumerate([None, *actions]):
         if action is not None:
-            block.step(row, action[None])
-        assert block.snapshot(row)[0].tobytes() == scenes[step].tobytes(), f"step {step}"
-        np.testing.assert_array_equal(achievements(block, row)[0], achieved[step])
+            env.step(row, action[None])
+        assert env.snapshot(row)[0].tobytes() == scenes[step].tobytes(), f"step {step}"
+        np.testing.assert_array_equal(achievements(env, row)[0], achieved[step])
     assert achieved[:, HUMAN_SKILLS].any(axis=0).all()
 
 

@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from stitching.envs.maze import MAZE, MOVES, Maze, MazeBlock
+from stitching.envs.maze import MAZE, MOVES, Maze, MazeVectorEnv
 from stitching.envs.protocol import conditions
 
 UP, DOWN, LEFT, RIGHT = range(4)
@@ -17,17 +17,17 @@ SMALL = Maze(
 )
 
 
-def at(*cells: tuple[int, int]) -> MazeBlock:
-    block = SMALL.block()
-    block.restore(np.array(cells, dtype=float), [])
-    return block
+def at(*cells: tuple[int, int]) -> MazeVectorEnv:
+    env = SMALL.vector_env()
+    env.restore(np.array(cells, dtype=float), [])
+    return env
 
 
 def moved(cell: tuple[int, int], *moves: int) -> tuple[int, int]:
-    block, row = at(cell), np.array([0])
+    env, row = at(cell), np.array([0])
     for move in moves:
-        block.step(row, np.eye(4, dtype=np.float32)[[move]])
-    return tuple(block.snapshot(row)[0].astype(int).tolist())
+        env.step(row, np.eye(4, dtype=np.float32)[[move]])
+    return tuple(env.snapshot(row)[0].astype(int).tolist())
 
 
 @pytest.mark.parametrize(
@@ -67,16 +67,16 @@ def test_a_way_through() -> None:
 
 
 def test_episodes_start_at_the_spawn() -> None:
-    block = SMALL.block()
-    block.reset([np.random.default_rng(0)] * 3)
-    assert block.snapshot(np.arange(3)).tolist() == [[3, 1]] * 3
+    env = SMALL.vector_env()
+    env.reset([np.random.default_rng(0)] * 3)
+    assert env.snapshot(np.arange(3)).tolist() == [[3, 1]] * 3
 
 
 def test_a_goal_holds_in_its_cell_alone() -> None:
     free = [tuple(cell) for cell in np.argwhere(SMALL.free)]
-    block, rows = at(*free), np.arange(len(free))
+    env, rows = at(*free), np.arange(len(free))
     for skill, (_, goal) in enumerate(SMALL.goals):
-        assert block.achieved(rows, skill).tolist() == [cell == goal for cell in free]
+        assert env.achieved(rows, skill).tolist() == [cell == goal for cell in free]
 
 
 def test_a_skill_is_told_by_its_goal() -> None:

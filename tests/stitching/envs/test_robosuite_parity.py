@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from stitching.envs.robosuite.block import RobosuiteBlock
 from stitching.envs.robosuite.can import CAN, Can
 from stitching.envs.robosuite.door import DOOR, Door
+from stitching.envs.robosuite.vector_env import RobosuiteVectorEnv
 from stitching.streams import stream
 from tests.stitching.envs.robosuite_original import Original, path_actions
 
@@ -49,36 +49,36 @@ def theirs(benchmark: Door | Can) -> Iterator[Original]:
     original.env.close()
 
 
-def begun(benchmark: Door | Can, theirs: Original, episode: int) -> RobosuiteBlock:
+def begun(benchmark: Door | Can, theirs: Original, episode: int) -> RobosuiteVectorEnv:
     theirs.reset(stream("parity", episode))
-    block = benchmark.block()
-    block.reset([stream("parity", episode)])
-    return block
+    env = benchmark.vector_env()
+    env.reset([stream("parity", episode)])
+    return env
 
 
 def played(benchmark: Door | Can, theirs: Original, episode: int) -> list[Step]:
-    block = begun(benchmark, theirs, episode)
-    actions = path_actions(benchmark, block.observe(FIRST)[0])
+    env = begun(benchmark, theirs, episode)
+    actions = path_actions(benchmark, env.observe(FIRST)[0])
     # Its controller's first torques are from before the fingers stood where they start.
     theirs.step(actions[0])
-    block.step(FIRST, actions[:1])
+    env.step(FIRST, actions[:1])
     steps = []
     for action in actions[1:]:
         before, command = theirs.state(), theirs.command()
-        snapshot = block.snapshot(FIRST)
+        snapshot = env.snapshot(FIRST)
         snapshot[0, : len(before)] = before
-        block.restore(snapshot, [stream("unused")])
-        block.step(FIRST, action[None])
+        env.restore(snapshot, [stream("unused")])
+        env.step(FIRST, action[None])
         ends = []
         for nudge in [0 * NUDGES[0], *NUDGES][::-1]:  # the last is the one to go on from
             theirs.go_to(before + np.r_[nudge, np.zeros(len(before) - 7)], command)
             theirs.step(action)
             ends.append(theirs.state()[: theirs.positions])
         after = theirs.state(), theirs.command(), theirs.data.ncon
-        gap = np.abs(block.positions(FIRST)[0] - ends[-1]).max()
+        gap = np.abs(env.positions(FIRST)[0] - ends[-1]).max()
         own = max(np.abs(end - ends[-1]).max() for end in ends[:-1])
-        success = bool(block.achieved(FIRST, 0)[0]), theirs.success()
-        observations = np.stack((block.observe(FIRST)[0], theirs.observation()))
+        success = bool(env.achieved(FIRST, 0)[0]), theirs.success()
+        observations = np.stack((env.observe(FIRST)[0], theirs.observation()))
         theirs.go_to(*after[:2])
         steps.append(Step(gap, own, observations, success, after[2]))
     return steps
@@ -91,20 +91,20 @@ def steps(benchmark: Door | Can, theirs: Original) -> list[Step]:
 
 def test_starts_are_theirs_to_the_bit(benchmark: Door | Can, theirs: Original) -> None:
     for episode in range(5):
-        block = begun(benchmark, theirs, episode)
-        assert block.positions(FIRST)[0].tobytes() == theirs.state()[: theirs.positions].tobytes()
-        snapshot = block.snapshot(FIRST)[0]
+        env = begun(benchmark, theirs, episode)
+        assert env.positions(FIRST)[0].tobytes() == theirs.state()[: theirs.positions].tobytes()
+        snapshot = env.snapshot(FIRST)[0]
         np.testing.assert_array_equal(snapshot[theirs.size + 1 :][:7], theirs.posture())
-        np.testing.assert_allclose(block.observe(FIRST)[0], theirs.observation(), atol=1e-6)
+        np.testing.assert_allclose(env.observe(FIRST)[0], theirs.observation(), atol=1e-6)
 
 
 def test_a_first_action_is_theirs(benchmark: Door | Can, theirs: Original) -> None:
     """Nearly: see `played`."""
-    block = begun(benchmark, theirs, 0)
-    action = path_actions(benchmark, block.observe(FIRST)[0])[0]
+    env = begun(benchmark, theirs, 0)
+    action = path_actions(benchmark, env.observe(FIRST)[0])[0]
     theirs.step(action)
-    block.step(FIRST, action[None])
-    gap = block.positions(FIRST)[0] - theirs.state()[: theirs.positions]
+    env.step(FIRST, action[None])
+    gap = env.positions(FIRST)[0] - theirs.state()[: theirs.positions]
     assert np.abs(gap).max() < TOLERANCE
 
 

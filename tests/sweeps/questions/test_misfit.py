@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 
 from analysis.episodes import episodes_from_segments
-from analysis.implied import bounds
-from analysis.run import RunSpec
+from analysis.paper.implied import bounds
+from analysis.schema import RunSpec
 from orchestrator.errors import UsageError
 from orchestrator.spec.methods import first_method
 from orchestrator.spec.spec import Spec, load_spec

@@ -1,0 +1,1 @@
+"""The task that a run shows, as pictures."""

@@ -1,0 +1,73 @@
+"""The numbers printed in the paper, and what can be checked about them without running anything."""
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+HALF_DIGIT = 0.0005
+"""Scores are printed to three decimals: each stands for everything this close to it."""
+
+NET_GAIN = "net-gain"
+"""The pseudo-method under which Table 5's last column is filed."""
+
+
+@lru_cache(maxsize=1)
+def _read() -> pd.DataFrame:
+    path = Path(__file__).with_name("tables.csv")
+    return pd.read_csv(path, dtype={"table": str}, keep_default_na=False, na_values={"error": [""]})
+
+
+def paper_table(number: str) -> pd.DataFrame:
+    """Columns row, tasks, method, score, error, note of a table of the paper; empty if it has none.
+
+    `tasks` is over how many tasks a row's scores are means: in Tables 1 and 2 all permutations of
+    that length, in Table 8 those that end with its skill, elsewhere one.
+    `error` is the number after the paper's ±, which it calls the variance over three seeds.
+    """
+    cells = _read()
+    return cells[cells["table"] == number].drop(columns="table").reset_index(drop=True)
+
+
+def paper_scores(number: str) -> dict[tuple[str, str], tuple[float, float]]:
+    """(row, method) -> (score, error) of one table, without Table 5's net gains."""
+    cells = paper_table(number)
+    keys = zip(cells["row"], cells["method"], strict=True)
+    numbers = zip(cells["score"], cells["error"], strict=True)
+    return {key: cell for key, cell in zip(keys, numbers, strict=True) if key[1] != NET_GAIN}
+
+
+def paper_tasks(number: str) -> dict[str, int]:
+    """Row -> the tasks that its scores in the paper are means over."""
+    cells = paper_table(number)
+    return dict(zip(cells["row"], cells["tasks"].astype(int), strict=True))
+
+
+def net_gain_check() -> pd.DataFrame:
+    """Table 5's printed net gains against those recomputed from its rounded scores.
+
+    A gain is (with - without) / without. Both scores are rounded, so the true gain lies in
+    [low, high]; a printed gain in there is explained by rounding, one outside is an error.
+
+    Columns row, printed, recomputed, low, high, explained_by_rounding.
+    """
+    scores = paper_table("5").set_index(["method", "row"])["score"]
+    without, with_stitch = scores.loc["no-stitch"], scores.loc["mb-stitch"]
+    checked = pd.DataFrame(
+        {
+            "printed": scores.loc[NET_GAIN],
+            "recomputed": with_stitch / without - 1,
+            "low": (with_stitch - HALF_DIGIT) / (without + HALF_DIGIT) - 1,
+            "high": (with_stitch + HALF_DIGIT) / (without - HALF_DIGIT) - 1,
+        }
+    )
+    checked["explained_by_rounding"] = checked["printed"].between(checked["low"], checked["high"])
+    return checked.reset_index().rename_axis(columns=None)
+
+
+def accomplished_skills(number: str, method: str) -> pd.Series:
+    """Score × task length of a method in a table whose rows read "<length> <noun>"."""
+    cells = paper_table(number).query("method == @method").set_index("row")["score"]
+    lengths = np.array([int(row.split()[0]) for row in cells.index])
+    return cells * lengths

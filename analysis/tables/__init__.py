@@ -1,0 +1,1 @@
+"""Tables of a run: their rows, cells and gains, and how they are written."""

@@ -1,0 +1,1 @@
+"""What a sweep leaves: its report, figures, table and MLflow view."""

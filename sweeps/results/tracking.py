@@ -1,0 +1,89 @@
+"""The MLflow view of a sweep: a parent run, and a child for each finished trial."""
+
+from __future__ import annotations
+
+import time
+
+from analysis.schema import leaves
+from orchestrator.reproduce import NO_TRACKING
+from orchestrator.spec.structure import Plain
+from orchestrator.storage.rundir import RunDirectory
+from orchestrator.tracking.metrics import finite
+from orchestrator.tracking.names import allowed_name, short_text
+from orchestrator.tracking.receipt import Status
+from orchestrator.tracking.stores import connect, open_experiment, turn_to_write
+from orchestrator.tracking.views import RunView
+from orchestrator.tracking.writing import Publisher
+from orchestrator.work.progress import Progress
+
+HIDDEN = ("fields", "trial", "tasks")  # of a trial's numbers
+SECONDS_BETWEEN = 60.0  # of publications while the search goes on
+
+
+class Tracker:
+    """Publishes what the sweep's directory holds; what fails is said and never raised."""
+
+    def __init__(self, uri: str, directory: RunDirectory, run_id: str, progress: Progress) -> None:
+        self._uri, self._directory, self._run_id = uri, directory, run_id
+        self._progress = progress
+        self._last = time.monotonic()
+
+    def publish(self, status: Status, *, patient: bool = False) -> None:
+        """Bring MLflow up to date; a patient publication is left out soon after another."""
+        soon = patient and time.monotonic() - self._last < SECONDS_BETWEEN
+        if self._uri == NO_TRACKING or soon:
+            return
+        self._last = time.monotonic()
+        try:
+            self._publish(status)
+        except Exception as error:
+            reason = (str(error).strip() or type(error).__name__).splitlines()[0][:300]
+            self._progress.say(f"tracking: {reason}; the next command publishes what was missed")
+
+    def _publish(self, status: Status) -> None:
+        directory = self._directory
+        names = ("spec.json", "sweep.json", "trials.json", "confirm.json", "winner.json")
+        files = {n: directory.path / n for n in names if (directory.path / n).is_file()}
+        report = directory.path / "report"
+        pages = {
+            str(path.relative_to(directory.path)): path
+            for path in sorted(report.rglob("*"))
+            if path.is_file()
+        }
+        sweep = directory.read_json("sweep.json")
+        parent = RunView(
+            name=f"sweep {sweep['name']} {sweep['scale']}",
+            status=status,
+            identity=(self._run_id, "", ""),
+            tags={"mlflow.source.name": "skillstitch", "skillstitch.sweep": sweep["name"]},
+            params={allowed_name(k): short_text(v) for k, v in leaves(sweep, ".").items()},
+            numbers=finite(_winner_numbers(directory)),
+            curves={},
+            files=files | pages,
+        )
+        children = [self._child(parent, t) for t in directory.read_json("trials.json") or []]
+        with turn_to_write(self._uri):
+            client = connect(self._uri)
+            benchmark = directory.spec().benchmark
+            experiment = open_experiment(client, self._uri, f"skillstitch/{benchmark}")
+            Publisher(client, experiment, files | pages, self._run_id).write(parent, children)
+
+    def _child(self, parent: RunView, trial: Plain) -> RunView:
+        number = str(trial["trial"])
+        return RunView(
+            name=f"trial {number}",
+            status="FINISHED",
+            identity=(self._run_id, "trial", number),
+            tags=parent.tags | {"skillstitch.trial": number},
+            params={allowed_name(k): short_text(v) for k, v in trial["fields"].items()}
+            | {"method": short_text(trial["method"])},
+            numbers=finite(leaves({k: v for k, v in trial.items() if k not in HIDDEN}, "/")),
+            curves={},
+        )
+
+
+def _winner_numbers(directory: RunDirectory) -> Plain:
+    winner = directory.read_json("winner.json") or {}
+    parts = {name: winner.get(name, {}) for name in ("search", "confirmed")}
+    shown = {n: {k: v for k, v in p.items() if k not in HIDDEN} for n, p in parts.items()}
+    return leaves({"winner": shown}, "/")
