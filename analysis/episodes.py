@@ -14,7 +14,7 @@ import pandas as pd
 
 from analysis.files import replaced_file
 from analysis.run import load_run
-from analysis.schema import SEPARATOR, RunError, RunSpec, task_length
+from analysis.schema import EPISODES, SEPARATOR, RunError, RunSpec, task_length
 
 COLUMNS = ["seed", "method", "task", "length", "episode", "accomplished", "score", "steps"]
 ABSENT, FAILED, SUCCEEDED = -1, 0, 1
@@ -83,7 +83,7 @@ def write_episodes(run_dir: Path) -> pd.DataFrame:
     """Writes `episodes.parquet` of a run directory, and returns it."""
     run = load_run(run_dir)
     episodes = episodes_from_segments(run.segments, run.spec, run.quarantine)
-    with replaced_file(run_dir / "episodes.parquet") as draft:
+    with replaced_file(run_dir / EPISODES) as draft:
         episodes.to_parquet(draft, index=False)
     return episodes
 

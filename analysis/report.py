@@ -14,11 +14,12 @@ from analysis.page.profile import profile_markdown
 from analysis.paper.profile import profiles
 from analysis.results import check_results, provenance_text
 from analysis.run import Run, load_run
+from analysis.schema import PROVENANCE
 from analysis.studies.forecast import forecast_table
 from analysis.studies.models import model_table
 from analysis.studies.pairs import both_skills, pair_groups, pair_table, second_skills, shown_orders
 from analysis.studies.rates import HEADER, NOTE, rate_lines, rate_table
-from analysis.studies.stitches import anatomy_table, stitch_table
+from analysis.studies.stitches import outcome_table, stitch_table
 from analysis.tables.skills import permutation_scores
 from analysis.tables.table import Table, build_table
 from analysis.tables.writers import markdown_table, to_csv, to_latex, to_markdown
@@ -53,7 +54,7 @@ def export_results(run_dir: Path, results_dir: Path, *, force: bool = False) -> 
         folder = results_dir / name
         with replaced_folder(folder) as draft:
             _copy_table(name, report, studies, drawn, draft)
-            _write(draft / "provenance.json", provenance_text(run.provenance, run.spec.extent))
+            _write(draft / PROVENANCE, provenance_text(run.provenance, run.spec.extent))
         folders.append(folder)
     return folders
 
@@ -123,8 +124,8 @@ def _studies(run: Run) -> Studies:
         studies["forecast"] = foretold
     if run.diagnoses:
         studies["rates"] = rate_table(run)
-    if run.anatomy:
-        studies["anatomy"], studies["stitches"] = anatomy_table(run), stitch_table(run)
+    if run.stitches:
+        studies["stitch-outcomes"], studies["stitches"] = outcome_table(run), stitch_table(run)
     return studies
 
 

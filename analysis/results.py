@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from analysis.schema import RunError
+from analysis.schema import PROVENANCE, RunError
 
 SCALES = ("smoke", "quick", "standard", "paper")  # from the smallest
 Extent = dict[str, str | int]
@@ -58,7 +58,7 @@ def provenance_text(provenance: dict[str, Any], extent: Extent) -> str:
 
 def extent_of(folder: Path) -> Extent:
     """Of the results in a folder; {} where there are none, or they do not say."""
-    file = folder / "provenance.json"
+    file = folder / PROVENANCE
     try:
         extent = dict(json.loads(file.read_text(encoding="utf-8")).get("extent", {}))
     except FileNotFoundError:

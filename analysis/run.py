@@ -7,7 +7,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from analysis.schema import RunError, RunSpec
+from analysis.schema import (
+    DATASETS,
+    DIAGNOSIS,
+    PROVENANCE,
+    QUARANTINE,
+    SEGMENTS,
+    SHOWCASE,
+    SPEC,
+    STITCHES,
+    TRAINING,
+    RunError,
+    RunSpec,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,10 +34,10 @@ class Run:
     provenance: dict[str, Any]
     quarantine: list[dict[str, Any]]
     training: list[dict[str, Any]]
-    showcases: dict[str, Any]  # by part, as `anatomy`
+    showcases: dict[str, Any]  # by part, as `stitches`
     datasets: list[dict[str, Any]]
-    diagnoses: dict[str, Any]  # by part, as `anatomy`
-    anatomy: dict[str, Any]  # by part, of a merged run; else by "" alone
+    diagnoses: dict[str, Any]  # by part, as `stitches`
+    stitches: dict[str, Any]  # by part, of a merged run; else by "" alone
 
     @property
     def diagnosis(self) -> dict[str, Any]:
@@ -35,15 +47,15 @@ class Run:
 
 def load_run_spec(run_dir: Path) -> RunSpec:
     """What was asked of a run, without what it played."""
-    return RunSpec.from_dict(_read_json(run_dir / "spec.json", {}))
+    return RunSpec.from_dict(_read_json(run_dir / SPEC, {}))
 
 
 def load_run(run_dir: Path) -> Run:
     """Reads a run directory, or says what it lacks."""
     import pandas as pd  # the words above are used where pandas need not be paid for
 
-    segments = run_dir / "segments.parquet"
-    for needed in (run_dir / "spec.json", segments):
+    segments = run_dir / SEGMENTS
+    for needed in (run_dir / SPEC, segments):
         if not needed.is_file():
             raise RunError(
                 f"no {needed.name} in {run_dir}: give the directory of a run that has finished "
@@ -52,13 +64,13 @@ def load_run(run_dir: Path) -> Run:
     return Run(
         spec=load_run_spec(run_dir),
         segments=pd.read_parquet(segments),
-        provenance=_read_json(run_dir / "provenance.json", {}),
-        quarantine=_read_json(run_dir / "quarantine.json", []),
-        training=_read_json(run_dir / "training.json", []),
-        showcases=_by_part(_read_json(run_dir / "showcase.json", {})),
-        datasets=_read_json(run_dir / "datasets.json", []),
-        diagnoses=_by_part(_read_json(run_dir / "diagnosis.json", {})),
-        anatomy=_by_part(_read_json(run_dir / "anatomy.json", {})),
+        provenance=_read_json(run_dir / PROVENANCE, {}),
+        quarantine=_read_json(run_dir / QUARANTINE, []),
+        training=_read_json(run_dir / TRAINING, []),
+        showcases=_by_part(_read_json(run_dir / SHOWCASE, {})),
+        datasets=_read_json(run_dir / DATASETS, []),
+        diagnoses=_by_part(_read_json(run_dir / DIAGNOSIS, {})),
+        stitches=_by_part(_read_json(run_dir / STITCHES, {})),
     )
 
 

@@ -16,6 +16,32 @@ VARIANT = "@"
 """Joins a method and what it was trained on: "mb-stitch@level-1" (Table 5)."""
 
 
+# The files of a run directory that reports are made from.
+SPEC = "spec.json"  # what was asked: `RunSpec`
+PROVENANCE = "provenance.json"  # versions, revision, machine, times
+SEGMENTS = "segments.parquet"  # a row for each segment: see EPISODE_COLUMNS
+EPISODES = "episodes.parquet"  # a row for each episode of a task: `analysis.episodes`
+QUARANTINE = "quarantine.json"  # blocks that failed three times
+TRAINING = "training.json"  # learning curves
+DATASETS = "datasets.json"  # rows, episodes and digest of each dataset
+SHOWCASE = "showcase.json"  # a task step by step
+DIAGNOSIS = "diagnosis.json"  # models judged on held-out data
+STITCHES = "stitches.json"  # the study of stitches
+
+EPISODE_COLUMNS = {
+    "episode": "int64",
+    "success": "bool",
+    "stitch_steps": "int64",
+    "steps": "int64",  # stitching included
+    "end_step": "int64",  # of the whole task so far
+    "value_start": "float32",  # of the segment's skill, before its stitch
+    "value_end": "float32",  # and after it
+}
+"""What happened in a segment → type, after the columns that say which one it is: seed, method (""
+for first skills that methods share), prefix (skills up to this one) and depth (how many they are).
+"""
+
+
 class RunError(ValueError):
     """A run directory that cannot be reported on; the message says what to do."""
 

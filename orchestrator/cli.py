@@ -92,10 +92,9 @@ def _sweep(words: list[str]) -> None:
 
 
 def _status(words: list[str]) -> None:
-    from orchestrator.printing import status_lines, suite_status_lines
-    from orchestrator.reproduce import catch_up
-    from orchestrator.spec.suite import is_suite, part_directories
+    from orchestrator.status import status_lines
     from orchestrator.storage.rundir import RunDirectory
+    from orchestrator.tracking.run import catch_up
 
     def status(run: tyro.conf.Positional[Path], store: Path | None = None) -> None:
         """How far a run directory is.
@@ -105,10 +104,9 @@ def _status(words: list[str]) -> None:
             store: where its artifacts are kept; default: where it was last carried out.
         """
         directory = RunDirectory(run)
-        lines = suite_status_lines if is_suite(directory) else status_lines
-        for line in lines(directory, store):
+        for line in status_lines(directory, store):
             OUTPUT.print(line, markup=False)
-        for each in (*part_directories(directory).values(), directory):
+        for each in (*directory.parts.values(), directory):
             if trouble := catch_up(each):
                 ERRORS.print(f"tracking: {trouble}", markup=False)
 
@@ -132,11 +130,10 @@ def _list(words: list[str]) -> None:
 
 def _report(words: list[str]) -> None:
     from analysis.report import build_report
-    from orchestrator.reproduce import catch_up
-    from orchestrator.spec.suite import is_suite
     from orchestrator.spec_commands import export
     from orchestrator.storage.merge import merge_again
     from orchestrator.storage.rundir import RunDirectory
+    from orchestrator.tracking.run import catch_up
 
     def report(
         run: tyro.conf.Positional[Path], results: Path | None = None, force: bool = False
@@ -156,7 +153,7 @@ def _report(words: list[str]) -> None:
                 report_again(directory, results, force=force)
             OUTPUT.print(f"wrote {run / 'report' / 'index.md'}", markup=False)
             return
-        suite = is_suite(directory)  # a clear error where there is no run
+        suite = directory.is_suite  # a clear error where there is no run
         with directory.locked(), said_to_users():
             if suite:
                 merge_again(directory)

@@ -9,15 +9,15 @@ from pathlib import Path
 from orchestrator.cores import usable_cores
 from orchestrator.spec.methods import method_label
 from orchestrator.spec.spec import Spec
-from orchestrator.spec.suite import Suite, part_directories
+from orchestrator.spec.suite import Suite
 from orchestrator.storage.ledger import Ledger
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.storage.store import CorruptArtifactError, Store
-from orchestrator.work.costs import Estimate, estimate
+from orchestrator.work.costs import CostEstimate, estimate
 from orchestrator.work.plan import Plan, make_plan
 
 
-def plan_lines(spec: Spec, costs: Estimate, workers: int | None) -> Iterator[str]:
+def plan_lines(spec: Spec, costs: CostEstimate, workers: int | None) -> Iterator[str]:
     """The plan of a spec and its cost, for a person to read before anything runs."""
     tasks = len(spec.all_tasks)
     yield f"{spec.name} at {spec.scale} scale: {spec.title}"
@@ -72,7 +72,7 @@ def forecast_lines(plan: Plan, store: Store) -> Iterator[str]:
         yield f"  {first:<{width}}  " + "  ".join(cells)
 
 
-def _time_line(costs: list[Estimate], workers: int | None) -> str:
+def _time_line(costs: list[CostEstimate], workers: int | None) -> str:
     workers = workers or usable_cores()
     measured = all(each.from_history for each in costs)
     source = "measured in this store" if measured else "from a reference machine"
@@ -84,7 +84,7 @@ def _time_line(costs: list[Estimate], workers: int | None) -> str:
     )
 
 
-def _disk_line(costs: list[Estimate]) -> str:
+def _disk_line(costs: list[CostEstimate]) -> str:
     return f"disk: about {max(1, sum(each.disk_bytes for each in costs) // 10**6)} MB more"
 
 
@@ -111,43 +111,6 @@ def suite_plan_lines(suite: Suite, store_root: Path, workers: int | None) -> Ite
     yield f"to be played: about {sum(each.segments_missing for each in costs):,} segments"
     yield _time_line(costs, workers)
     yield _disk_line(costs)
-
-
-def status_lines(directory: RunDirectory, store_root: Path | None = None) -> Iterator[str]:
-    """How far a run is: artifacts in a store (default: its own), blocks, what was given up."""
-    spec = directory.spec()
-    plan = make_plan(spec)
-    store = Store(store_root or directory.store_root)
-    built = sum((recipe.kind, key) in store for key, recipe in plan.recipes.items())
-    ledger = directory.ledger(read_only=True)
-    finished, failures = ledger.finished(), ledger.failures()
-    ledger.close()
-    yield f"{directory.path}: {spec.name} at {spec.scale} scale"
-    yield f"  artifacts  {built} of {len(plan.recipes)}"
-    yield f"  blocks     {len(finished)} played of at most {len(plan.tasks)}"
-    if failures:
-        yield f"  failures   {len(failures)} blocks failed at least once"
-    for entry in directory.read_json("quarantine.json") or []:
-        yield f"  given up   seed {entry['seed']}, {entry['method']}, {entry['prefix']}"
-    yield _report_line(directory)
-
-
-def _report_line(directory: RunDirectory) -> str:
-    report = directory.path / "report" / "index.html"
-    return f"  report     {report if report.is_file() else 'not written yet'}"
-
-
-def suite_status_lines(directory: RunDirectory, store_root: Path | None) -> Iterator[str]:
-    """How far a suite and each of its parts is."""
-    asked = directory.asked()
-    yield f"{directory.path}: {asked['name']} at {asked['scale']} scale"
-    for label, part in part_directories(directory).items():
-        if (part.path / "ledger.sqlite").is_file():
-            yield f"  part       {label}"
-            yield from (f"    {line}" for line in status_lines(part, store_root))
-        else:
-            yield f"  part       {label}: not begun"
-    yield _report_line(directory)
 
 
 def summary_lines(directory: RunDirectory) -> Iterator[str]:

@@ -10,12 +10,12 @@ from pathlib import Path
 
 from analysis.episodes import write_episodes
 from analysis.report import build_report
+from analysis.schema import PROVENANCE, QUARANTINE
 from orchestrator import tracking
 from orchestrator.cores import usable_cores
 from orchestrator.errors import (
     BadDataError,
     IncompleteError,
-    LockedError,
     SkillstitchError,
     UsageError,
 )
@@ -24,11 +24,13 @@ from orchestrator.executors.protocol import Executor
 from orchestrator.spec.spec import Spec
 from orchestrator.spec.structure import Plain
 from orchestrator.storage import locking
+from orchestrator.storage.claim import claim_for_spec
 from orchestrator.storage.exports import write_readable
 from orchestrator.storage.ledger import Ledger
 from orchestrator.storage.provenance import provenance
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.storage.store import USUAL_STORE, Artifact, Store, storage_errors
+from orchestrator.tracking.run import publish
 from orchestrator.work.building import Builds, verified_artifacts
 from orchestrator.work.evaluation import Evaluation
 from orchestrator.work.jobs import Job, Report
@@ -36,7 +38,6 @@ from orchestrator.work.plan import Plan, make_plan
 from orchestrator.work.progress import Progress
 from orchestrator.work.stopwatch import Stopwatch
 
-NO_TRACKING = "none"
 MOST_ON_A_CORE = 8  # workers: each holds a copy of torch and of a simulator
 
 
@@ -111,13 +112,13 @@ def reproduce(spec: Spec, settings: Settings, progress: Progress) -> RunDirector
     """
     directory, watch = RunDirectory(settings.out), Stopwatch()
     with directory.locked(), locking.shared(settings.store, progress.say):
-        run_id = directory.settle(spec)
+        run_id = claim_for_spec(directory, spec)
         directory.uses(settings.store)
         with tracked(directory, settings, progress, watch):
             worked = _carry_out(spec, settings, directory, run_id, progress, watch)
         if worked:
             directory.write_json("seconds.json", watch.rounded())
-        if given_up := directory.read_json("quarantine.json"):
+        if given_up := directory.read_json(QUARANTINE):
             raise partial_error(f"{len(given_up)} blocks", directory)
     return directory
 
@@ -165,7 +166,7 @@ def _carry_out(
     else:
         directory.mark(finished=False)
         facts: Plain = {"run_id": run_id}
-        directory.write_json("provenance.json", provenance() | facts)
+        directory.write_json(PROVENANCE, provenance() | facts)
         facts |= _work(plan, settings, directory, store, ledger, present, progress, watch)
         with storage_errors(directory.path):
             counts = write_readable(plan, store, ledger, directory)
@@ -174,7 +175,7 @@ def _carry_out(
             counts["environment steps without the tree"] = int(episodes["steps"].sum())
             watch.lap("writing")
             facts |= {"seconds": watch.rounded(), "counts": counts}
-            directory.write_json("provenance.json", provenance() | facts)
+            directory.write_json(PROVENANCE, provenance() | facts)
     with storage_errors(directory.path):
         build_report(directory.path)
     directory.mark(finished=True)
@@ -244,33 +245,3 @@ def _announce(directory: RunDirectory, uri: str) -> threading.Thread:
     thread = threading.Thread(target=publish, args=(directory, uri), daemon=True)
     thread.start()
     return thread
-
-
-def publish(
-    directory: RunDirectory, uri: str, *, finished: bool = False, failed: bool = False
-) -> str:
-    """Bring MLflow's view of a run up to date; returns what went wrong, "" if nothing did."""
-    if uri == NO_TRACKING:
-        return ""
-    outcome = tracking.publish(directory.path, uri, finished=finished, failed=failed)
-    return "" if outcome.ok else f"{outcome.error}; the next command publishes what was missed"
-
-
-def catch_up(directory: RunDirectory) -> str:
-    """Publish what an earlier command could not; cheap where nothing was missed.
-
-    A run under way is left to its own process.
-    """
-    receipt = directory.read_json("tracking.json")
-    if receipt is None:
-        return ""
-    try:
-        with directory.locked():
-            return publish(
-                directory,
-                receipt["uri"],
-                finished=directory.played,
-                failed=receipt["status"] == "FAILED" and not directory.played,
-            )
-    except LockedError:
-        return ""

@@ -11,8 +11,9 @@ from orchestrator.errors import IncompleteError, SkillstitchError
 from orchestrator.executors import open_executor
 from orchestrator.reproduce import Settings, partial_error, reproduce, tracked
 from orchestrator.spec.spec import Spec
-from orchestrator.spec.suite import Suite, part_directory, suite_differences, suite_of
+from orchestrator.spec.suite import Suite, suite_differences, suite_of
 from orchestrator.storage import locking
+from orchestrator.storage.claim import claim
 from orchestrator.storage.merge import describe_suite, write_merged
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.storage.store import storage_errors
@@ -36,13 +37,14 @@ def reproduce_suite(suite: Suite, settings: Settings, progress: Progress) -> Run
     """
     directory, watch = RunDirectory(settings.out), Stopwatch()
     with directory.locked(), locking.shared(settings.store, progress.say):
-        run_id = directory.claim(
+        run_id = claim(
+            directory,
             describe_suite(suite),
             [make_plan(part.spec) for part in suite.parts],
             lambda: suite_differences(suite_of(directory), suite),
         )
         directory.uses(settings.store)
-        parts = {part.label: part_directory(directory, part.label) for part in suite.parts}
+        parts = {part.label: directory.part(part.label) for part in suite.parts}
         done = directory.finished and all(part.finished for part in parts.values())
         if not done:
             directory.mark(finished=False)

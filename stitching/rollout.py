@@ -122,10 +122,10 @@ def play_segment(
     budget: np.ndarray,
     recorder: Recorder | None = None,
 ) -> Segments:
-    """Stitch to the last skill of `play.prefix` and execute it, for all episodes together.
+    """Stitch to the last skill of `block.prefix` and execute it, for all episodes together.
 
-    The environment stands at a skill boundary. A skill counts as accomplished at the first step at which
-    its goal holds, stitching steps included. budget (n,) int64: steps left in each episode.
+    The environment stands at a skill boundary. A skill counts as accomplished at the first step at
+    which its goal holds, stitching steps included. budget (n,) int64: steps left in each episode.
     """
     names = [skill.name for skill in benchmark.skills]
     skill = names.index(block.prefix[-1])
@@ -216,9 +216,7 @@ def policy_noise(actions: ActionSpace, streams: Sequence[np.random.Generator]) -
     return np.stack([rng.standard_normal(actions.size, dtype=np.float32) for rng in streams])
 
 
-def _value(
-    agent: Agent, alpha: float, env: VectorEnv, rows: np.ndarray, skill: int
-) -> np.ndarray:
+def _value(agent: Agent, alpha: float, env: VectorEnv, rows: np.ndarray, skill: int) -> np.ndarray:
     """E[V] − stop_alpha · Var(V) of real states, (n,) float32: what the stop rule watches."""
     if not len(rows):
         return np.zeros(0, dtype=np.float32)
@@ -265,7 +263,7 @@ def play_from_start(
 
 
 def begin(env: VectorEnv, block: Block, snapshots: np.ndarray | None) -> None:
-    """Put an environment at the start of a segment: the benchmark's start state, or skill boundaries."""
+    """Start a segment: at the benchmark's start state (None), or at skill boundaries."""
     streams: Sequence[np.random.Generator] = block.streams("environment")
     if snapshots is None:
         env.reset(streams)

@@ -45,11 +45,11 @@ def confirm(sweep: SweepSpec, study: SweepStudy, player: SpecPlayer) -> Plain:
         return {}
     spec, seeds = confirm_spec(sweep)
     candidates = [study.fields(trial) for trial in best]
-    *showings, base = sweep.question.play(player, spec, [*candidates, {}], seeds)
+    *all_measured, base = sweep.question.play(player, spec, [*candidates, {}], seeds)
     rows = []
-    for trial, showing in zip(best, showings, strict=True):
+    for trial, measured in zip(best, all_measured, strict=True):
         names = (sweep.name, "confirm", str(trial.number))
-        again = sweep.question.again(trial.user_attrs[RESULT], showing, base, *names)
+        again = sweep.question.again(trial.user_attrs[RESULT], measured, base, *names)
         rows.append(
             {
                 "trial": trial.number,

@@ -9,7 +9,7 @@ from pathlib import Path
 from orchestrator.spec.spec import Spec
 from orchestrator.storage.ledger import Ledger
 from orchestrator.storage.store import Store
-from orchestrator.work.costs import Estimate, estimate
+from orchestrator.work.costs import CostEstimate, estimate
 from orchestrator.work.plan import make_plan
 from sweeps.search import search_spec
 from sweeps.spec import SweepSpec
@@ -39,7 +39,7 @@ def plan_lines(sweep: SweepSpec, store: Path) -> Iterator[str]:
     yield f"  a trial: at most {most} blocks; the base's own setting has {there}"
 
 
-def _estimate(spec: Spec, store: Path, methods: tuple[str, ...]) -> Estimate:
+def _estimate(spec: Spec, store: Path, methods: tuple[str, ...]) -> CostEstimate:
     ledger = Ledger.look(store / "blocks.sqlite")
     try:
         return estimate(make_plan(replace(spec, methods=methods)), Store(store), ledger)
@@ -47,7 +47,7 @@ def _estimate(spec: Spec, store: Path, methods: tuple[str, ...]) -> Estimate:
         ledger.close()
 
 
-def _artifacts(spec: Spec, costs: Estimate) -> str:
+def _artifacts(spec: Spec, costs: CostEstimate) -> str:
     """Those that scores depend on."""
     plan = make_plan(spec)
     kinds = {recipe.kind for key, recipe in plan.recipes.items() if key in plan.needed}
@@ -55,7 +55,7 @@ def _artifacts(spec: Spec, costs: Estimate) -> str:
     return _found(*map(sum, zip(*counts, strict=True)))
 
 
-def _blocks(costs: Estimate, methods: Iterable[str]) -> str:
+def _blocks(costs: CostEstimate, methods: Iterable[str]) -> str:
     counts = [costs.blocks.get(method, {}) for method in methods]
     there = sum(count.get("found", 0) + count.get("decided", 0) for count in counts)
     return f"{_found(there, sum(count.get('missing', 0) for count in counts))} blocks"

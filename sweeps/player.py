@@ -15,9 +15,9 @@ from analysis.schema import RunSpec
 from orchestrator.errors import IncompleteError
 from orchestrator.executors.protocol import Executor
 from orchestrator.spec.spec import Spec
+from orchestrator.storage.claim import describe
 from orchestrator.storage.exports import quarantine, segments_frame
 from orchestrator.storage.ledger import Ledger, Outcome
-from orchestrator.storage.rundir import describe
 from orchestrator.storage.store import Artifact, Store
 from orchestrator.work.building import Builds, verified_artifacts
 from orchestrator.work.evaluation import Evaluation
@@ -30,7 +30,7 @@ SHARED = "first skills, shared"
 
 
 @dataclass(frozen=True)
-class Played:
+class PlayedSpec:
     """What a spec's episodes did: rows a segment and rows an episode (see `analysis`)."""
 
     segments: pd.DataFrame
@@ -125,7 +125,7 @@ class SpecPlayer:
         """Train what some specs need and the store does not have, side by side."""
         self._build([only_seeds(make_plan(spec), _seeds(spec, seeds)) for spec in specs])
 
-    def play(self, spec: Spec, seeds: Iterable[int] | None = None) -> Played:
+    def play(self, spec: Spec, seeds: Iterable[int] | None = None) -> PlayedSpec:
         """Train and simulate what is missing; all seeds of the spec, or some.
 
         Raises IncompleteError when blocks had to be given up: a result on what is left would be
@@ -142,7 +142,7 @@ class SpecPlayer:
             )
         segments = segments_frame(plan, self.ledger)
         run = replace(RunSpec.from_dict(describe(spec)), seeds=wanted)
-        return Played(segments, episodes_from_segments(segments, run), run)
+        return PlayedSpec(segments, episodes_from_segments(segments, run), run)
 
     def _build(self, plans: Sequence[Plan]) -> None:
         if not plans:

@@ -22,12 +22,12 @@ from orchestrator.spec.spec import Spec
 from orchestrator.spec.structure import Plain
 from stitching.methods.mb_stitch import MBStitchSettings
 from sweeps.candidates import NO_STITCH, group
-from sweeps.player import Played, SpecPlayer
+from sweeps.player import PlayedSpec, SpecPlayer
 from sweeps.space import Fields
 
 
 @dataclass(frozen=True)
-class Showing:
+class MeasuredGain:
     """How one candidate did beside No-Stitch under the base's models."""
 
     method: str
@@ -96,9 +96,9 @@ class Showing:
 
 def play_candidates(
     player: SpecPlayer, base: Spec, candidates: Sequence[Fields], seeds: Sequence[int] | None = None
-) -> list[Showing]:
+) -> list[MeasuredGain]:
     """All candidates on the base's tasks and episodes; what they share is played once."""
-    showings: dict[int, Showing] = {}
+    measured: dict[int, MeasuredGain] = {}
     baseline = pd.DataFrame()
     groups = group(candidates, base, f"sweep over {base.name}")
     player.prepare([one.spec for one in groups], seeds)
@@ -107,8 +107,8 @@ def play_candidates(
         if NO_STITCH in one.spec.methods:
             baseline = _of(played.episodes, NO_STITCH)
         for place, method in one.methods.items():
-            showings[place] = _showing(played, one.spec, method, baseline)
-    return [showings[place] for place in range(len(candidates))]
+            measured[place] = _measured(played, one.spec, method, baseline)
+    return [measured[place] for place in range(len(candidates))]
 
 
 def pareto_front(trials: Sequence[Plain]) -> list[Plain]:
@@ -125,10 +125,10 @@ def pareto_front(trials: Sequence[Plain]) -> list[Plain]:
     ]
 
 
-def _showing(played: Played, spec: Spec, method: str, baseline: pd.DataFrame) -> Showing:
+def _measured(played: PlayedSpec, spec: Spec, method: str, baseline: pd.DataFrame) -> MeasuredGain:
     settings = spec.method_settings(method)
     assert isinstance(settings, MBStitchSettings)
-    return Showing(
+    return MeasuredGain(
         method,
         settings,
         _of(played.segments, method),

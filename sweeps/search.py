@@ -15,7 +15,7 @@ from orchestrator.spec.structure import Plain
 from orchestrator.work.progress import Progress
 from stitching.streams import stream
 from sweeps.player import SpecPlayer
-from sweeps.questions.question import Showing
+from sweeps.questions.question import Measured
 from sweeps.space import describe
 from sweeps.spec import SweepSpec, base_spec, split_tasks
 from sweeps.study import RESULT, SweepStudy, expected, wilcoxon
@@ -82,23 +82,23 @@ def _play_batch(
     }
     parts = rounds(spec, sweep.pruner.rounds)
     going_on = list(batch)
-    shown: dict[int, tuple[Showing, int]] = {}  # number → what it did, in how many rounds
+    shown: dict[int, tuple[Measured, int]] = {}  # number → what it did, in how many rounds
     for done, part in enumerate(parts, start=1):
         fields = [study.fields(trial) for trial in going_on]
-        showings = sweep.question.play(player, part, fields, None)
-        shown |= {t.number: (s, done) for t, s in zip(going_on, showings, strict=True)}
+        all_measured = sweep.question.play(player, part, fields, None)
+        shown |= {t.number: (s, done) for t, s in zip(going_on, all_measured, strict=True)}
         if len(parts) == 1:
             break
-        instances = [showing.instances(places) for showing in showings]
+        instances = [measured.instances(places) for measured in all_measured]
         for trial, gains in zip(going_on, instances, strict=True):
             _report(study, trial, gains)
         if done < len(parts):
             judged = zip(going_on, instances, strict=True)
             going_on = [trial for trial, gains in judged if not _hopeless(study, trial, gains)]
     for trial in batch:
-        showing, done = shown[trial.number]
-        result = showing.result(sweep.name, str(trial.number))
-        result |= {"pruned": done < len(parts), "rounds": done, "method": showing.method}
+        measured, done = shown[trial.number]
+        result = measured.result(sweep.name, str(trial.number))
+        result |= {"pruned": done < len(parts), "rounds": done, "method": measured.method}
         if result["pruned"]:
             result[expected("gain")] = _expected_gain(study, result)
         study.keep(trial, result)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from analysis.schema import PROVENANCE
 from orchestrator.errors import ChangedError, UsageError
 from orchestrator.reproduce import LazyExecutor, Settings
 from orchestrator.spec.structure import Plain, structure, to_plain
 from orchestrator.storage import locking
+from orchestrator.storage.claim import claim_for_spec, spec_of
 from orchestrator.storage.provenance import provenance
 from orchestrator.storage.rundir import SWEEP, RunDirectory
 from orchestrator.storage.store import storage_errors
@@ -55,7 +57,7 @@ def carry_out(
     """
     directory = RunDirectory(settings.out)
     with directory.locked(), locking.shared(settings.store, progress.say):
-        run_id = directory.settle(search_spec(sweep))
+        run_id = claim_for_spec(directory, search_spec(sweep))
         settle(directory, sweep)
         directory.uses(settings.store)
         study = SweepStudy(sweep, directory.path)
@@ -77,7 +79,7 @@ def carry_out(
                 _write_results(directory, study, player.executor, earlier)
                 directory.write_json("confirm.json", confirm(sweep, study, player))
                 directory.write_json("winner.json", winner(directory, study))
-                directory.write_json("provenance.json", provenance() | {"run_id": run_id})
+                directory.write_json(PROVENANCE, provenance() | {"run_id": run_id})
                 if sweep.tables:
                     with player.quietly():
                         write_table(sweep, player, directory.path / "table")
@@ -134,7 +136,7 @@ def winner(directory: RunDirectory, study: SweepStudy) -> Plain:
     return {
         "sweep": study.sweep.name,
         "base": study.sweep.base,
-        "benchmark": directory.spec().benchmark,
+        "benchmark": spec_of(directory).benchmark,
         "trial": best[0].number,
         "fields": study.fields(best[0]),
         "search": best[0].user_attrs[RESULT],

@@ -11,7 +11,7 @@ from analysis.figures.forecast import draw_forecast
 from analysis.figures.pairs import draw_pairs
 from analysis.figures.scores import draw_scores
 from analysis.figures.showcase.showcases import draw_showcases
-from analysis.figures.stitches import draw_anatomy
+from analysis.figures.stitches import draw_outcomes
 from analysis.figures.style import house_style, save
 from analysis.run import Run
 from analysis.studies.pairs import shown_orders, shown_pairs
@@ -51,9 +51,9 @@ def draw_figures(
             save(draw_forecast(forecast, run.spec), folder, "forecast")
             drawn.append(Drawn("forecast", FORECAST_CAPTION, ""))
         drawn += _diagnosis(run, folder)
-        if any(begun(study) for study in run.anatomy.values()):
-            save(draw_anatomy(run.anatomy), folder, "anatomy")
-            drawn.append(Drawn("anatomy", ANATOMY_CAPTION, ""))
+        if any(begun(study) for study in run.stitches.values()):
+            save(draw_outcomes(run.stitches), folder, "stitch-outcomes")
+            drawn.append(Drawn("stitch-outcomes", OUTCOMES_CAPTION, ""))
         if run.training:
             save(draw_curves(run.training), folder, "curves")
             drawn.append(Drawn("curves", "Training, one line for each trained model.", ""))
@@ -82,7 +82,7 @@ VALUE_CURVES_CAPTION = (
     "ensemble's mean spread. ρ is the rank correlation of value with time, averaged over them."
 )
 
-ANATOMY_CAPTION = (
+OUTCOMES_CAPTION = (
     "Stitches of the first seed's models, coloured by what came of them: each episode was also "
     "played on from the same state without a stitch. Stitches to a task's first skill, where there "
     "are any, and those between two skills have a row each. From left to right: the value of the "

@@ -21,7 +21,7 @@ LOOKS = {
 ORDER = ("failed either way", "succeeded either way", "helped", "hurt")  # on top at last
 
 
-def draw_anatomy(studies: Mapping[str, Study]) -> Figure:
+def draw_outcomes(studies: Mapping[str, Study]) -> Figure:
     """A row of four panels for each part and kind of stitches that has any."""
     shown = {label(part, kind): study for part, kind, study in of_parts(studies) if begun(study)}
     figure = new_figure(12.4, 0.6 + 3.0 * len(shown))

@@ -28,7 +28,7 @@ from analysis.tables.writers import BOOTSTRAP, describe, seed_note
 
 OF_PAIRS = ("forecast",)
 OF_MODELS = ("diagnosis", "diagnosis-values")
-OF_STITCHES = ("anatomy",)
+OF_STITCHES = ("stitch-outcomes",)
 """Figures that stand beside what they are about, and not with those of the whole run."""
 
 PERMUTATION_COLUMNS: list[dict[str, Any]] = [

@@ -200,9 +200,9 @@ def _dynamics(run: Run, known: Known) -> str:
 
 def stitches_section(run: Run, studies: Mapping[str, pd.DataFrame]) -> str:
     """What stitches did to the skill they lead to, what was expected of them, and what warned."""
-    if "anatomy" not in studies or studies["stitches"].empty:
+    if "stitch-outcomes" not in studies or studies["stitches"].empty:
         return ""
-    parts = studies["anatomy"].to_dict("records")
+    parts = studies["stitch-outcomes"].to_dict("records")
     header = [
         "Stitches to", "Skill succeeds without", "with a stitch", "Stitches", "Helped", "Hurt",
         "Gain predicted", "Gain realised", "ρ", *(f"{name} (AUC)" for name in WARNINGS.values()),
@@ -264,7 +264,7 @@ def _by_outcome(stitches: pd.DataFrame) -> str:
 
 def _tried(run: Run) -> str:
     """ "7 first skills and 20 pairs, 6 episodes of each" """
-    study = max(run.anatomy.values(), key=lambda one: len(one["pairs"]))
+    study = max(run.stitches.values(), key=lambda one: len(one["pairs"]))
     counts = {kind: len(own["pairs"]) for kind, own in by_kind(study).items()}
     words = {FIRST_SKILLS: "first skill", HAND_OVERS: "pair"}
     tried = [f"{count} {words[kind]}{'s'[: count != 1]}" for kind, count in counts.items()]
@@ -272,7 +272,7 @@ def _tried(run: Run) -> str:
 
 
 def _begun_where(run: Run) -> str:
-    first = any(FIRST_SKILLS in by_kind(study) for study in run.anatomy.values())
+    first = any(FIRST_SKILLS in by_kind(study) for study in run.stitches.values())
     return (
         f"{'Every first skill from the start of an episode, and every' if first else 'Every'} "
         "ordered pair of skills, or some of them, from where No-Stitch's first one succeeded: "

@@ -63,7 +63,7 @@ def _rows(run: Run, label: str, spec: RunSpec) -> Iterator[Record]:
         own, met = study["competence"][skill], after[after["second"] == skill]
         price = study.get("prices", {}).get(skill, {})
         values, states = (price.get(f"{of}_spread", math.nan) for of in ("value", "dynamics"))
-        beta = run.anatomy.get(label, {}).get("beta", math.nan)
+        beta = run.stitches.get(label, {}).get("beta", math.nan)
         yield {
             "part": label,
             "skill": run.spec.skill_label(skill),

@@ -108,13 +108,13 @@ def stitch_table(run: Run) -> pd.DataFrame:
             "value_spread": np.mean([plan["spread"] for plan in stitch["plans"]]),
             "dynamics_spread": np.mean([plan["disagreement"] for plan in stitch["plans"]]),
         }
-        for part, kind, study in of_parts(run.anatomy)
+        for part, kind, study in of_parts(run.stitches)
         for stitch in begun(study)
     ]
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def anatomy_table(run: Run) -> pd.DataFrame:
+def outcome_table(run: Run) -> pd.DataFrame:
     """One row a part and kind: counts, gains by a plan's first action, and what warned of hurting.
 
     "episodes" came to a stitch, "stitches" of them took a step; successes are those
@@ -132,7 +132,7 @@ def anatomy_table(run: Run) -> pd.DataFrame:
             **_gained(study),
             **dict(_warned(stitches[(stitches["part"] == part) & (stitches["kind"] == kind)])),
         }
-        for part, kind, study in of_parts(run.anatomy)
+        for part, kind, study in of_parts(run.stitches)
     ]
     return pd.DataFrame(rows)
 

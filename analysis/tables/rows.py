@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, order=True)
-class Place:
+class CellPlace:
     """Where a task played by a method is counted."""
 
     order: tuple[int, ...]  # rows are sorted by this
@@ -25,34 +25,34 @@ class Place:
     method: str
 
 
-RowRule = Callable[[str, str, RunSpec, TableEntry], Place]
+RowRule = Callable[[str, str, RunSpec, TableEntry], CellPlace]
 
 
-def by_length(task: str, method: str, spec: RunSpec, table: TableEntry) -> Place:
+def by_length(task: str, method: str, spec: RunSpec, table: TableEntry) -> CellPlace:
     """Tables 1 and 2: "2 goals"."""
     length = task_length(task)
     noun = table.noun.removesuffix("s") if length == 1 else table.noun
-    return Place((length,), f"{length} {noun}", method)
+    return CellPlace((length,), f"{length} {noun}", method)
 
 
-def by_last_skill(task: str, method: str, spec: RunSpec, table: TableEntry) -> Place:
+def by_last_skill(task: str, method: str, spec: RunSpec, table: TableEntry) -> CellPlace:
     """Table 8: "X → Y → kettle", where X and Y stand for any other skills."""
     *before, last = task.split(SEPARATOR)
     names = [f"X{i}" for i in range(1, len(before) + 1)] if len(before) > 3 else list("XYZ")
     row = " → ".join([*names[: len(before)], spec.skill_label(last)])
-    return Place((len(before) + 1, spec.skills.index(last)), row, method)
+    return CellPlace((len(before) + 1, spec.skills.index(last)), row, method)
 
 
-def by_task(task: str, method: str, spec: RunSpec, table: TableEntry) -> Place:
+def by_task(task: str, method: str, spec: RunSpec, table: TableEntry) -> CellPlace:
     """Tables 3, 4 and 9: every task is a row."""
-    return Place((task_length(task), spec.tasks.index(task)), spec.task_label(task), method)
+    return CellPlace((task_length(task), spec.tasks.index(task)), spec.task_label(task), method)
 
 
-def by_variant(task: str, method: str, spec: RunSpec, table: TableEntry) -> Place:
+def by_variant(task: str, method: str, spec: RunSpec, table: TableEntry) -> CellPlace:
     """Table 5: "level-1", from methods named "mb-stitch@level-1"."""
     base, _, variant = method.partition(VARIANT)
     variants = list(dict.fromkeys(name.partition(VARIANT)[2] for name in spec.methods))
-    return Place((variants.index(variant),), variant, base)
+    return CellPlace((variants.index(variant),), variant, base)
 
 
 ROW_RULES: dict[str, RowRule] = {

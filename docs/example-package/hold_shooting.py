@@ -13,8 +13,8 @@ import torch
 
 from stitching.bounds import Bounded, Count, Few
 from stitching.envs.protocol import ActionSpace
-from stitching.planning.protocol import Plan, Score
-from stitching.planning.ranking import rankable
+from stitching.planning.protocol import PlannedActions, Score
+from stitching.planning.ranking import sortable
 
 
 @dataclass(frozen=True)
@@ -34,12 +34,14 @@ class HoldShooting(Bounded):
     @torch.no_grad()
     def plan(
         self, score: Score, streams: Sequence[np.random.Generator], actions: ActionSpace
-    ) -> Plan:
+    ) -> PlannedActions:
         drawn = np.empty((len(streams), self.population, 1, actions.size), dtype=np.float32)
         for row, stream in zip(drawn, streams, strict=True):
             row[:] = actions.uniform(stream, (self.population, 1))
         sequences = torch.from_numpy(drawn.repeat(self.horizon, axis=2))
         problems = torch.arange(len(streams))
-        scores = rankable(score(problems, sequences), problems)
+        scores = sortable(score(problems, sequences), problems)
         best = scores.argmax(dim=1)
-        return Plan(sequences[problems, best], scores[problems, best], torch.ones_like(problems))
+        return PlannedActions(
+            sequences[problems, best], scores[problems, best], torch.ones_like(problems)
+        )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from orchestrator.benchmarks.kit import Costs, Dataset, Kit
+from orchestrator.benchmarks.entry import BenchmarkEntry, Costs, Dataset
 from orchestrator.builders.parts import Builder, Inputs, as_artifact
 from orchestrator.spec.structure import Plain, structure
 from orchestrator.storage.store import Artifact
@@ -113,7 +113,7 @@ def _build(params: Plain, inputs: Inputs) -> Artifact:
 
 
 TRACK = Track()
-TRACK_KIT = Kit(
+TRACK_ENTRY = BenchmarkEntry(
     TRACK,
     TrackData,
     lambda config: {"demonstrations": Dataset("track-demonstrations")},

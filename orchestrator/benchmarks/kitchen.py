@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
-from orchestrator.benchmarks.kit import Costs, Dataset, Kit, physics_illustrations
+from orchestrator.benchmarks.entry import BenchmarkEntry, Costs, Dataset, physics_illustrations
 from orchestrator.builders.kitchen import KITCHEN_BUILDERS
 from orchestrator.builders.long_horizon import LONG_HORIZON_BUILDERS
 from orchestrator.builders.studies import Studies
@@ -55,7 +55,7 @@ def _sha256(file: str) -> str:
 
 STUDIES = Studies("kitchen", {KITCHEN.name: KITCHEN}, GROUPS, foretells=True)
 
-KITCHEN_KIT = Kit(
+KITCHEN_ENTRY = BenchmarkEntry(
     KITCHEN,
     KitchenDataConfig,
     _datasets,
@@ -73,7 +73,7 @@ KITCHEN_KIT = Kit(
             "kitchen-held-out": 15.0,
         },
         whole={
-            "kitchen-anatomy": 300.0,
+            "kitchen-stitches": 300.0,
             "kitchen-diagnosis": 120.0,
             "kitchen-showcase": 60.0,
         },

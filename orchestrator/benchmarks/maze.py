@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from orchestrator.benchmarks.kit import Costs, Dataset, Illustration, Kit
+from orchestrator.benchmarks.entry import BenchmarkEntry, Costs, Dataset, Illustration
 from orchestrator.builders.maze import MAZE_BUILDERS
 from orchestrator.builders.studies import maze_showcase_builder
 from stitching.data.maze import MazeDataConfig
@@ -12,11 +12,11 @@ from stitching.envs.maze import MAZE
 def _datasets(config: MazeDataConfig) -> dict[str, Dataset]:
     return {
         "demonstrations": Dataset("maze-demonstrations"),
-        "exploration": Dataset("maze-exploration", teaches=False),
+        "exploration": Dataset("maze-exploration", for_training=False),
     }
 
 
-MAZE_KIT = Kit(
+MAZE_ENTRY = BenchmarkEntry(
     MAZE,
     MazeDataConfig,
     _datasets,

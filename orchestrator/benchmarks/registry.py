@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from orchestrator.benchmarks.kit import Kit
-from orchestrator.benchmarks.kitchen import KITCHEN_KIT
-from orchestrator.benchmarks.maze import MAZE_KIT
-from orchestrator.benchmarks.robosuite import CAN_KIT, DOOR_KIT
+from orchestrator.benchmarks.entry import BenchmarkEntry
+from orchestrator.benchmarks.kitchen import KITCHEN_ENTRY
+from orchestrator.benchmarks.maze import MAZE_ENTRY
+from orchestrator.benchmarks.robosuite import CAN_ENTRY, DOOR_ENTRY
 from stitching.envs.protocol import Benchmark
 from stitching.registry import PartError, with_installed
 
-KITS: dict[str, Kit] = with_installed(
+ENTRIES: dict[str, BenchmarkEntry] = with_installed(
     "skillstitch.benchmarks",
-    {kit.benchmark.name: kit for kit in (MAZE_KIT, KITCHEN_KIT, DOOR_KIT, CAN_KIT)},
-    lambda part: "" if isinstance(part, Kit) else "is no Kit",
+    {entry.benchmark.name: entry for entry in (MAZE_ENTRY, KITCHEN_ENTRY, DOOR_ENTRY, CAN_ENTRY)},
+    lambda part: "" if isinstance(part, BenchmarkEntry) else "is no BenchmarkEntry",
 )
 
-for _name, _kit in KITS.items():
-    if _kit.benchmark.name != _name:
-        raise PartError(f"the benchmark {_kit.benchmark.name!r} is registered as {_name!r}")
+for _name, _entry in ENTRIES.items():
+    if _entry.benchmark.name != _name:
+        raise PartError(f"the benchmark {_entry.benchmark.name!r} is registered as {_name!r}")
 
-BENCHMARKS: dict[str, Benchmark] = {name: kit.benchmark for name, kit in KITS.items()}
+BENCHMARKS: dict[str, Benchmark] = {name: entry.benchmark for name, entry in ENTRIES.items()}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from orchestrator.benchmarks.kit import Costs, Dataset, Kit, physics_illustrations
+from orchestrator.benchmarks.entry import BenchmarkEntry, Costs, Dataset, physics_illustrations
 from orchestrator.builders.robosuite import ROBOSUITE_BUILDERS
 from orchestrator.builders.studies import Studies
 from stitching.data.robosuite.demonstrations import RobosuiteDataConfig
@@ -14,8 +14,8 @@ from stitching.envs.robosuite.vector_env import GROUPS
 STUDIES = Studies("robosuite", {DOOR.name: DOOR, CAN.name: CAN}, GROUPS)
 
 
-def _kit(benchmark: Benchmark, *task: str) -> Kit:
-    return Kit(
+def _entry(benchmark: Benchmark, *task: str) -> BenchmarkEntry:
+    return BenchmarkEntry(
         benchmark,
         RobosuiteDataConfig,
         lambda config: {"demonstrations": Dataset("robosuite-demonstrations")},
@@ -24,7 +24,7 @@ def _kit(benchmark: Benchmark, *task: str) -> Kit:
             update={"agent": 0.03, "mf-policy": 0.01, "dynamics": 0.01},
             demonstration={"robosuite-demonstrations": 0.6, "robosuite-held-out": 0.6},
             whole={
-                "robosuite-anatomy": 150.0,
+                "robosuite-stitches": 150.0,
                 "robosuite-diagnosis": 60.0,
                 "robosuite-showcase": 60.0,
             },
@@ -39,5 +39,5 @@ def _kit(benchmark: Benchmark, *task: str) -> Kit:
     )
 
 
-DOOR_KIT = _kit(DOOR, "open door", "close door")
-CAN_KIT = _kit(CAN, "can", "can")
+DOOR_ENTRY = _entry(DOOR, "open door", "close door")
+CAN_ENTRY = _entry(CAN, "can", "can")

@@ -5,12 +5,12 @@ from __future__ import annotations
 from functools import reduce
 from operator import or_
 
-from orchestrator.benchmarks.registry import KITS
+from orchestrator.benchmarks.registry import ENTRIES
 from orchestrator.builders.parts import Builder
 from orchestrator.builders.training import TRAINING_BUILDERS
 
 BUILDERS: dict[str, Builder] = reduce(
-    or_, (dict(kit.builders) for kit in KITS.values()), TRAINING_BUILDERS
+    or_, (dict(entry.builders) for entry in ENTRIES.values()), TRAINING_BUILDERS
 )
 
 # What decides a block's outcome beside its method and its models: Algorithm 1, and what counts.

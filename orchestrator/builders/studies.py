@@ -27,7 +27,7 @@ from stitching.studies.forecast import pair_forecast
 from stitching.studies.showcase.maze import maze_showcase
 from stitching.studies.showcase.physics import physics_showcase
 from stitching.studies.showcase.shown import Shown
-from stitching.studies.stitches import StudiedMethod, anatomy
+from stitching.studies.stitches import StudiedMethod, study_stitches
 
 
 def _stitcher(method: str, settings: Plain, models: Models) -> Stitcher:
@@ -89,8 +89,8 @@ class Studies:
                 self._showcase, ("stitching.studies.showcase.physics", *PLAYED), SETUP
             ),
             f"{self.family}-diagnosis": Builder(self._diagnosis, judging, SETUP),
-            f"{self.family}-anatomy": Builder(
-                self._anatomy, ("stitching.studies.stitches", *PLAYED), SETUP
+            f"{self.family}-stitches": Builder(
+                self._stitches, ("stitching.studies.stitches", *PLAYED), SETUP
             ),
         }
 
@@ -118,7 +118,7 @@ class Studies:
             study["forecast"] = pair_forecast(benchmark, data, study["competence"])
         return Artifact({}, study)
 
-    def _anatomy(self, params: Plain, inputs: Inputs) -> Artifact:
+    def _stitches(self, params: Plain, inputs: Inputs) -> Artifact:
         """Inputs beside the models are what the skills were learned from."""
         benchmark = self.benchmarks[params["benchmark"]]
         models = load_models(benchmark, inputs)
@@ -137,4 +137,4 @@ class Studies:
         learned_from = (role for role in sorted(inputs) if role not in models.trained)
         data = concatenate([Transitions(**inputs[role].arrays) for role in learned_from])
         pairs = [(first, second) for first, second in params["pairs"]]
-        return Artifact({}, anatomy(studied, data, pairs, params["episodes"]))
+        return Artifact({}, study_stitches(studied, data, pairs, params["episodes"]))

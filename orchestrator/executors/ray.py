@@ -56,7 +56,7 @@ class _Player:
 
 
 @dataclass(eq=False)
-class _Seat:
+class _Slot:
     """One actor and how many jobs it has been given."""
 
     actor: Any
@@ -66,10 +66,10 @@ class _Seat:
 
 @dataclass
 class _Flight:
-    """A job under way; builds have no seat."""
+    """A job under way; builds have no slot."""
 
     job: Job
-    seat: _Seat | None = field(default=None)
+    slot: _Slot | None = field(default=None)
 
 
 class RayExecutor:
@@ -82,7 +82,7 @@ class RayExecutor:
         self._most_workers = workers
         self.workers = self._capacity()
         self._references: dict[str, Any] = {}
-        self._seats: list[_Seat] = []
+        self._slots: list[_Slot] = []
         self._waiting: deque[PlayJob] = deque()
         self._flights: dict[Any, _Flight] = {}
 
@@ -106,16 +106,16 @@ class RayExecutor:
         except RayError as error:
             report = Report(self._lose(reference), trouble="lost", error=_first_line(error))
         else:
-            seat = self._flights.pop(reference).seat
-            if seat is not None:
-                seat.jobs -= 1
-                seat.started = True
+            slot = self._flights.pop(reference).slot
+            if slot is not None:
+                slot.jobs -= 1
+                slot.started = True
         self._seat_waiting()
         return report
 
     def close(self) -> None:
-        for seat in list(self._seats):
-            self._dismiss(seat)
+        for slot in list(self._slots):
+            self._dismiss(slot)
         for reference in self._flights:  # builds: the actors' jobs went with them
             ray.cancel(reference, force=True)
         self._flights.clear()
@@ -133,27 +133,27 @@ class RayExecutor:
     def _dismiss_the_stranded(self) -> None:
         """Actors for which a lost node has left no core never start: others take their jobs."""
         self.workers = self._capacity()
-        surplus = max(0, len(self._seats) - self.workers)
-        for seat in [seat for seat in self._seats if not seat.started][:surplus]:
-            self._waiting.extendleft(reversed(self._dismiss(seat)))
+        surplus = max(0, len(self._slots) - self.workers)
+        for slot in [slot for slot in self._slots if not slot.started][:surplus]:
+            self._waiting.extendleft(reversed(self._dismiss(slot)))
         self._seat_waiting()
 
     def _lose(self, reference: Any) -> Job:
         """The job whose worker died. What waited behind it is innocent and goes to another."""
-        seat = self._flights[reference].seat
-        if seat is None:
+        slot = self._flights[reference].slot
+        if slot is None:
             job: Job = self._flights.pop(reference).job
         else:
-            job, *behind = self._dismiss(seat)
+            job, *behind = self._dismiss(slot)
             self._waiting.extendleft(reversed(behind))
         self.workers = self._capacity()
         return job
 
-    def _dismiss(self, seat: _Seat) -> list[PlayJob]:
+    def _dismiss(self, slot: _Slot) -> list[PlayJob]:
         """End an actor; returns the jobs it still had, the one it was busy with first."""
-        self._seats.remove(seat)
-        ray.kill(seat.actor)
-        flights = [item for item in self._flights.items() if item[1].seat is seat]
+        self._slots.remove(slot)
+        ray.kill(slot.actor)
+        flights = [item for item in self._flights.items() if item[1].slot is slot]
         for reference, _ in flights:
             del self._flights[reference]
         return [flight.job for _, flight in flights if isinstance(flight.job, PlayJob)]
@@ -166,21 +166,21 @@ class RayExecutor:
     def _seat_waiting(self) -> None:
         """Hand waiting jobs to the least busy actors, hiring actors up to the number of workers."""
         while self._waiting:
-            if len(self._seats) < self.workers:
-                self._seats.append(_Seat(_Player.remote()))  # type: ignore[attr-defined]
-            seat = min(self._seats, key=lambda seat: seat.jobs)
-            if seat.jobs >= JOBS_PER_WORKER:
+            if len(self._slots) < self.workers:
+                self._slots.append(_Slot(_Player.remote()))  # type: ignore[attr-defined]
+            slot = min(self._slots, key=lambda slot: slot.jobs)
+            if slot.jobs >= JOBS_PER_WORKER:
                 return
             job = self._waiting.popleft()
             keys = {key for task, _ in job.tasks for key in task.artifacts.values()}
             references = {key: self._references[key] for key in keys}
-            seat.jobs += 1
-            self._flights[seat.actor.play.remote(job, references)] = _Flight(job, seat)
+            slot.jobs += 1
+            self._flights[slot.actor.play.remote(job, references)] = _Flight(job, slot)
 
     def _release_seats(self) -> None:
         """Actors hold a core each; give them back so that training tasks can use them."""
-        for seat in [seat for seat in self._seats if not seat.jobs]:
-            self._dismiss(seat)
+        for slot in [slot for slot in self._slots if not slot.jobs]:
+            self._dismiss(slot)
 
 
 def _start(workers: int | None, address: str | None) -> None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Union
 import tyro
 
 from analysis.tables.rows import ROW_RULES
-from orchestrator.benchmarks.registry import BENCHMARKS, KITS
+from orchestrator.benchmarks.registry import BENCHMARKS, ENTRIES
 from orchestrator.builders.models import LOADERS
 from orchestrator.errors import UsageError
 from orchestrator.spec.methods import (
@@ -64,7 +64,7 @@ if TYPE_CHECKING:
         """A field for the settings of each method: `mb_stitch`, `reach_stitch`."""
 
 else:
-    DataSettings = Union[tuple(dict.fromkeys(kit.data for kit in KITS.values()))]  # noqa: UP007
+    DataSettings = Union[tuple(dict.fromkeys(entry.data for entry in ENTRIES.values()))]  # noqa: UP007
     with_settings = {name: one.settings for name, one in METHODS.items() if fields(one.settings)}
     MethodSections = sections("MethodSections", with_settings)
 
@@ -239,7 +239,7 @@ def _check_altered_data(spec: Spec, where: str) -> None:
 
 def _check_demonstrated(spec: Spec, where: str) -> None:
     """Whether there can be demonstrations of a long task that nobody cut."""
-    if not KITS[spec.benchmark].long_horizon(spec.data):
+    if not ENTRIES[spec.benchmark].long_horizon(spec.data):
         raise UsageError(f"{where}: these data of {spec.benchmark} demonstrate no long task")
 
 
@@ -262,7 +262,7 @@ def spec_from_plain(content: Plain, where: str) -> Spec:
         raise UsageError(
             f"{where}: unknown benchmark {benchmark!r}; there are {', '.join(BENCHMARKS)}"
         )
-    data = structure(KITS[benchmark].data, content.get("data", {}), f"{where}, data")
+    data = structure(ENTRIES[benchmark].data, content.get("data", {}), f"{where}, data")
     return structure(Spec, content | {"data": data}, where)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from analysis.schema import plain_label
+from analysis.schema import SPEC, plain_label
 from orchestrator.errors import UsageError
 from orchestrator.spec.spec import (
     Spec,
@@ -185,14 +185,9 @@ def with_specs(suite: Suite, specs: list[Spec]) -> Suite:
     return replace(suite, parts=tuple(replace(part, spec=spec) for part, spec in parts))
 
 
-def is_suite(directory: RunDirectory) -> bool:
-    """UsageError where there is neither a run nor a suite."""
-    return "parts" in directory.asked()["spec"]
-
-
 def suite_of(directory: RunDirectory) -> Suite:
     """The suite a directory was made for. UsageError where it was made for a run."""
-    plain, where = directory.asked()["spec"], str(directory.path / "spec.json")
+    plain, where = directory.asked()["spec"], str(directory.path / SPEC)
     if "parts" not in plain:
         raise UsageError(f"{directory.path} holds a run and no suite; choose another --out")
     parts = tuple(
@@ -200,19 +195,6 @@ def suite_of(directory: RunDirectory) -> Suite:
         for part in plain["parts"]
     )
     return structure(Suite, plain | {"parts": parts}, where)
-
-
-def part_directories(directory: RunDirectory) -> dict[str, RunDirectory]:
-    """The run directory of each part of a suite, made or not; none of a run."""
-    if not is_suite(directory):
-        return {}
-    labels = [part.label for part in suite_of(directory).parts]
-    return {label: part_directory(directory, label) for label in labels}
-
-
-def part_directory(directory: RunDirectory, label: str) -> RunDirectory:
-    """The run directory of a part, within its suite's."""
-    return RunDirectory(directory.path / "parts" / label)
 
 
 def suite_differences(old: Suite, new: Suite) -> list[str]:

@@ -5,22 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from analysis.schema import DATASETS, EPISODE_COLUMNS, QUARANTINE, SEGMENTS, SEPARATOR, TRAINING
 from orchestrator.spec.structure import Plain
 from orchestrator.storage.ledger import Ledger
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.storage.store import Store
 from orchestrator.work.jobs import ATTEMPTS
 from orchestrator.work.plan import Node, Plan
-
-EPISODE_COLUMNS = {
-    "episode": np.int64,
-    "success": np.bool_,
-    "stitch_steps": np.int64,
-    "steps": np.int64,
-    "end_step": np.int64,
-    "value_start": np.float32,
-    "value_end": np.float32,
-}
 
 
 def segments_frame(plan: Plan, ledger: Ledger) -> pd.DataFrame:
@@ -36,7 +27,7 @@ def segments_frame(plan: Plan, ledger: Ledger) -> pd.DataFrame:
         {
             "seed": np.array([node.seed for node in nodes], dtype=np.int64),
             "method": [node.method for node in nodes],
-            "prefix": [">".join(node.prefix) for node in nodes],
+            "prefix": [SEPARATOR.join(node.prefix) for node in nodes],
             "depth": np.array([len(node.prefix) for node in nodes], dtype=np.int64),
         }
         | {name: np.concatenate(parts) for name, parts in columns.items()}
@@ -53,7 +44,7 @@ def quarantine(plan: Plan, ledger: Ledger) -> list[Plain]:
         {
             "method": node.method,
             "seed": node.seed,
-            "prefix": ">".join(node.prefix),
+            "prefix": SEPARATOR.join(node.prefix),
             "episodes": list(range(*task.episodes)),
             "error": failures[task.key][1],
         }
@@ -99,10 +90,10 @@ def datasets(plan: Plan, store: Store) -> list[Plain]:
 def write_readable(plan: Plan, store: Store, ledger: Ledger, directory: RunDirectory) -> Plain:
     """Write every readable file but the report; returns the counts for the provenance."""
     segments = segments_frame(plan, ledger)
-    segments.to_parquet(directory.path / "segments.parquet", index=False)
-    directory.write_json("quarantine.json", quarantine(plan, ledger))
-    directory.write_json("training.json", learning_curves(plan, store))
-    directory.write_json("datasets.json", datasets(plan, store))
+    segments.to_parquet(directory.path / SEGMENTS, index=False)
+    directory.write_json(QUARANTINE, quarantine(plan, ledger))
+    directory.write_json(TRAINING, learning_curves(plan, store))
+    directory.write_json(DATASETS, datasets(plan, store))
     for name, key in plan.illustrations.items():
         kind = plan.recipes[key].kind
         if (kind, key) in store:

@@ -10,8 +10,9 @@ from pathlib import Path
 
 from orchestrator.errors import UsageError
 from orchestrator.spec.spec import Spec
-from orchestrator.spec.suite import is_suite, part_directory, suite_of
+from orchestrator.spec.suite import suite_of
 from orchestrator.storage import locking
+from orchestrator.storage.claim import spec_of
 from orchestrator.storage.ledger import Ledger
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.storage.store import Store
@@ -35,7 +36,7 @@ def collect_garbage(store_root: Path, runs: Sequence[Path], *, delete: bool) -> 
     with locking.alone(store_root) if delete else nullcontext():
         needed: set[str] = set()
         for run in map(RunDirectory, runs):
-            needed |= _of_suite(run) if is_suite(run) else _of_run(run)
+            needed |= _of_suite(run) if run.is_suite else _of_run(run)
         yield from _collect(Store(store_root), needed, delete=delete)
 
 
@@ -75,7 +76,7 @@ def _collect(store: Store, needed: set[str], *, delete: bool) -> Iterator[str]:
 
 
 def _of_run(directory: RunDirectory) -> set[str]:
-    needed = _planned(directory.spec())
+    needed = _planned(spec_of(directory))
     # The run may have been made by other code, under which the same things had other names.
     ledger = directory.ledger(read_only=True)
     needed |= ledger.artifacts() | ledger.finished()
@@ -87,7 +88,7 @@ def _of_suite(directory: RunDirectory) -> set[str]:
     """All that its parts need, those included that have not begun."""
     needed: set[str] = set()
     for part in suite_of(directory).parts:
-        run = part_directory(directory, part.label)
+        run = directory.part(part.label)
         begun = (run.path / "ledger.sqlite").is_file()
         needed |= _of_run(run) if begun else _planned(part.spec)
     return needed

@@ -55,7 +55,7 @@ class Outcome:
 
 
 @dataclass(frozen=True)
-class Played:
+class PlayCounts:
     """What segments of one kind took and came to."""
 
     segments: int
@@ -70,8 +70,8 @@ class Played:
     def success_rate(self) -> float:
         return self.successes / self.segments
 
-    def __add__(self, other: Played) -> Played:
-        return Played(
+    def __add__(self, other: PlayCounts) -> PlayCounts:
+        return PlayCounts(
             self.segments + other.segments,
             self.successes + other.successes,
             self.seconds + other.seconds,
@@ -209,7 +209,7 @@ class Ledger:
         with self._storage_errors():
             self._db.execute("VACUUM")
 
-    def add_played(self, name: str, played: Played) -> None:
+    def add_played(self, name: str, played: PlayCounts) -> None:
         """Remember how playing segments of a kind went, for later estimates."""
         with self._transaction():
             self._db.execute(
@@ -219,11 +219,11 @@ class Ledger:
                 (name, played.segments, played.successes, played.seconds),
             )
 
-    def history(self) -> dict[str, Played]:
+    def history(self) -> dict[str, PlayCounts]:
         """All that was ever played, by kind of segment."""
         with self._storage_errors():
             rows = self._db.execute("SELECT * FROM played WHERE segments > 0")
-            return {name: Played(*counts) for name, *counts in rows}
+            return {name: PlayCounts(*counts) for name, *counts in rows}
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
+from analysis.schema import QUARANTINE, SPEC
 from orchestrator.errors import UsageError
 from orchestrator.spec.structure import Plain
 from orchestrator.storage.rundir import RunDirectory
@@ -33,9 +34,9 @@ def listing_lines(root: Path) -> Iterator[str]:
 def _run_folders(root: Path) -> Iterator[Path]:
     """Parts of a suite and the table of a sweep belong to it; what a store holds is no run."""
     for folder, below, files in os.walk(root):
-        if "spec.json" in files:
+        if SPEC in files:
             yield Path(folder)
-        if "spec.json" in files or STORE in files:
+        if SPEC in files or STORE in files:
             below.clear()
 
 
@@ -60,7 +61,7 @@ def _progress(directory: RunDirectory, sweep: Plain) -> str:
 def _state(directory: RunDirectory) -> str:
     if directory.played:
         return "finished"
-    if given_up := directory.read_json("quarantine.json"):
+    if given_up := directory.read_json(QUARANTINE):
         return f"{len(given_up)} blocks given up"
     if not (directory.path / "ledger.sqlite").is_file():
         return "unfinished"

@@ -9,12 +9,24 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.schema import SEPARATOR, VARIANT, plain_label
-from orchestrator.benchmarks.registry import KITS
+from analysis.schema import (
+    DATASETS,
+    DIAGNOSIS,
+    PROVENANCE,
+    QUARANTINE,
+    SEGMENTS,
+    SEPARATOR,
+    SHOWCASE,
+    STITCHES,
+    TRAINING,
+    VARIANT,
+    plain_label,
+)
+from orchestrator.benchmarks.registry import ENTRIES
 from orchestrator.errors import UsageError
 from orchestrator.spec.methods import first_method, method_label, method_of
 from orchestrator.spec.structure import Plain, to_plain
-from orchestrator.spec.suite import Part, Suite, part_directory, suite_of
+from orchestrator.spec.suite import Part, Suite, suite_of
 from orchestrator.storage.rundir import RunDirectory
 
 SUMMED = ("counts", "seconds", "busy worker seconds")  # of the parts' provenance
@@ -130,7 +142,7 @@ def _describe_part(suite: Suite, part: Part) -> Plain:
 def _title(suite: Suite, table: Any) -> str:
     """A table's title, which names unusual data as a run's does, unless its rows do."""
     title = table.title or suite.title
-    data = {part.label: KITS[part.spec.benchmark].label(part.spec.data) for part in suite.parts}
+    data = {part.label: ENTRIES[part.spec.benchmark].label(part.spec.data) for part in suite.parts}
     if len(set(data.values())) == 1:
         unusual = next(iter(data.values()))
     else:
@@ -145,16 +157,16 @@ def write_merged(suite: Suite, directory: RunDirectory, run_id: str) -> None:
     UsageError where no part has played anything.
     """
     there = {
-        part.label: part_directory(directory, part.label)
+        part.label: directory.part(part.label)
         for part in suite.parts
-        if (part_directory(directory, part.label).path / "segments.parquet").is_file()
+        if (directory.part(part.label).path / SEGMENTS).is_file()
     }
     if not there:
         raise UsageError(f"{directory.path}: no part has a segments.parquet yet; run the suite")
     named = {part.label: Naming(suite, part) for part in suite.parts}
     segments = [_segments(there[label], named[label]) for label in there]
     merged = pd.concat(segments, ignore_index=True)
-    merged.to_parquet(directory.path / "segments.parquet", index=False)
+    merged.to_parquet(directory.path / SEGMENTS, index=False)
 
     def gathered(name: str, renamed: Callable[[Plain, Naming], Iterator[Plain]]) -> list[Plain]:
         return [
@@ -164,20 +176,20 @@ def write_merged(suite: Suite, directory: RunDirectory, run_id: str) -> None:
             for entry in renamed(plain, named[label])
         ]
 
-    directory.write_json("quarantine.json", gathered("quarantine.json", _given_up))
-    directory.write_json("training.json", gathered("training.json", _trained))
-    directory.write_json("datasets.json", gathered("datasets.json", _dataset))
+    directory.write_json(QUARANTINE, gathered(QUARANTINE, _given_up))
+    directory.write_json(TRAINING, gathered(TRAINING, _trained))
+    directory.write_json(DATASETS, gathered(DATASETS, _dataset))
     for name, of_part in {
-        "anatomy.json": anatomy_of_part,
-        "diagnosis.json": diagnosis_of_part,
-        "showcase.json": showcase_of_part,
+        STITCHES: stitches_of_part,
+        DIAGNOSIS: diagnosis_of_part,
+        SHOWCASE: showcase_of_part,
     }.items():
         found = {label: part.read_json(name) for label, part in there.items()}
         parts = {label: of_part(one, named[label]) for label, one in found.items() if one}
         if parts:
             directory.write_json(name, {"parts": parts})
-    made = {label: part.read_json("provenance.json") for label, part in there.items()}
-    directory.write_json("provenance.json", _provenance(made) | {"run_id": run_id})
+    made = {label: part.read_json(PROVENANCE) for label, part in there.items()}
+    directory.write_json(PROVENANCE, _provenance(made) | {"run_id": run_id})
 
 
 def merge_again(directory: RunDirectory) -> None:
@@ -187,7 +199,7 @@ def merge_again(directory: RunDirectory) -> None:
 
 
 def _segments(part: RunDirectory, naming: Naming) -> pd.DataFrame:
-    frame = pd.read_parquet(part.path / "segments.parquet")
+    frame = pd.read_parquet(part.path / SEGMENTS)
     frame["prefix"] = frame["prefix"].map({p: naming.prefix(p) for p in frame["prefix"].unique()})
     copies = [
         rows.assign(method=name)
@@ -213,7 +225,7 @@ def _dataset(dataset: Plain, naming: Naming) -> Iterator[Plain]:
     yield kept | {"name": f"{naming.part.label}: {dataset['name']}"}
 
 
-def anatomy_of_part(study: Plain, naming: Naming) -> Plain:
+def stitches_of_part(study: Plain, naming: Naming) -> Plain:
     """Stitches of a part, between skills as they are called where all parts meet."""
 
     def renamed(entry: Plain) -> Plain:

@@ -39,7 +39,7 @@ def matters(plans: Iterable[Plan]) -> Plain:
         for kind in plan.scored_kinds:
             builder = BUILDERS[kind]
             made[f"code that makes {kind}"] = code_fingerprint(builder.code, builder.setup)[:12]
-        for blocks in plan.method_envs.values():
+        for blocks in plan.method_blocks.values():
             name = method_label(blocks.name) if blocks.name else "shared first skills"
             played.setdefault(f"code that plays {name}", set()).add(blocks.code[:12])
     packages = {name: importlib.metadata.version(name) for name in NUMERIC_PACKAGES}

@@ -4,24 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import json
-import uuid
-from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Protocol
 
 import analysis
-from orchestrator.benchmarks.registry import KITS
-from orchestrator.errors import ChangedError, UsageError
-from orchestrator.spec.methods import first_method, method_label, method_of
-from orchestrator.spec.spec import Spec, TableSpec, differences, plain_spec, spec_from_plain
-from orchestrator.spec.structure import Plain, to_plain
+from analysis.schema import QUARANTINE, SPEC
+from orchestrator.errors import UsageError
+from orchestrator.spec.structure import Plain
 from orchestrator.storage import locking
 from orchestrator.storage.ledger import Ledger
-from orchestrator.storage.provenance import matters
 from orchestrator.storage.store import USUAL_STORE, write_atomically
-from orchestrator.work.plan import Plan, make_plan
 
+PLANNED = "plan.json"
 SWEEP = "sweep.json"
 REPORT_SOURCES = (".py", ".csv", ".html", ".css", ".js")
 
@@ -31,11 +26,12 @@ class RunDirectory:
 
     spec.json         what was asked, resolved
     identity.json     id of this run, and the versions that must not change under it
+    plan.json         the artifacts and the number of blocks that it takes
     store.json        path of the store that it was last carried out over
     ledger.sqlite     every finished block
     provenance.json   where, when and with what it was made
     segments.parquet, episodes.parquet, training.json, datasets.json, report/
-    showcase.json, diagnosis.json, anatomy.json  what only figures need, where the benchmark has it
+    showcase.json, diagnosis.json, stitches.json  what only figures need, where the benchmark has it
     quarantine.json   blocks that were given up
     seconds.json      where the time of the last command that did any work went
     finished          there when all of the above is
@@ -63,7 +59,7 @@ class RunDirectory:
     @property
     def played(self) -> bool:
         """Whether everything is played and written, with nothing given up."""
-        return (self.path / "finished").is_file() and not self.read_json("quarantine.json")
+        return (self.path / "finished").is_file() and not self.read_json(QUARANTINE)
 
     @property
     def finished(self) -> bool:
@@ -81,53 +77,28 @@ class RunDirectory:
         """Hold the directory; LockedError at once, naming the holder, if somebody else does."""
         return locking.held(self.path)
 
-    def settle(self, spec: Spec) -> str:
-        """Claim the directory for a spec, or check that it is the same one; returns the run's id.
-
-        Raises ChangedError naming what differs: a field, a package version, the code.
-        """
-        return self.claim(describe(spec), [make_plan(spec)], lambda: differences(self.spec(), spec))
-
-    def claim(
-        self, description: Plain, plans: Iterable[Plan], differing: Callable[[], list[str]]
-    ) -> str:
-        """As `settle`, for whatever is described; `differing` compares it with what is there.
-
-        Its scores depend on what these plans make and play.
-        """
-        now = matters(plans)
-        identity_path = self.path / "identity.json"
-        if not identity_path.exists():
-            identity = {"run_id": uuid.uuid4().hex, "matters": now}
-            self.write_json("spec.json", description)
-            self.write_json("identity.json", identity)
-            return str(identity["run_id"])
-        identity = json.loads(identity_path.read_text())
-        changed = differing()
-        before = identity["matters"]
-        changed += [
-            f"{name}: {before.get(name)} → {now[name]}"
-            for name in sorted(now)
-            if before.get(name) != now[name]
-        ]
-        if changed:
-            raise ChangedError(
-                f"{self.path} was made under something else; choose another --out (finished "
-                "artifacts and blocks are shared), or go back to:\n  " + "\n  ".join(changed)
-            )
-        return str(identity["run_id"])
-
-    def spec(self) -> Spec:
-        """The spec this directory was made for. UsageError where there is no run."""
-        return spec_from_plain(self.asked()["spec"], str(self.path / "spec.json"))
-
     def asked(self) -> Plain:
         """spec.json, of a run or a suite. UsageError where there is neither."""
-        path = self.path / "spec.json"
+        path = self.path / SPEC
         if not path.is_file():
             raise UsageError(f"{self.path} is no run directory: it has no spec.json")
         plain: Plain = json.loads(path.read_text())
         return plain
+
+    @property
+    def is_suite(self) -> bool:
+        """Whether it holds several runs. UsageError where there is neither a run nor a suite."""
+        return "parts" in self.asked()["spec"]
+
+    @property
+    def parts(self) -> dict[str, RunDirectory]:
+        """The run directory of each part of a suite, made or not; none of a run."""
+        parts = self.asked()["spec"].get("parts", [])
+        return {part["label"]: self.part(part["label"]) for part in parts}
+
+    def part(self, label: str) -> RunDirectory:
+        """The run directory of a part, within its suite's."""
+        return RunDirectory(self.path / "parts" / label)
 
     def asked_sweep(self) -> Plain | None:
         """What was asked of the sweep that was begun here; None where none was."""
@@ -151,38 +122,6 @@ def analysis_fingerprint() -> str:
     package = Path(analysis.__file__).parent
     files = sorted(path for path in package.rglob("*") if path.suffix in REPORT_SOURCES)
     return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()
-
-
-def describe(spec: Spec) -> Plain:
-    """The spec for readers of a run directory: resolved lists, and the spec itself."""
-    return {
-        "name": spec.name,
-        "title": spec.title,
-        "benchmark": spec.benchmark,
-        "scale": spec.scale,
-        "skills": spec.skill_names,
-        "methods": [
-            {
-                "name": method,
-                "label": method_label(method),
-                "own_first_skill": bool(first_method(method, spec.rollout)),
-                "models": list(method_of(method).models),
-            }
-            for method in spec.methods
-        ],
-        "seeds": list(range(spec.seeds)),
-        "episodes": spec.episodes,
-        "tasks": [">".join(task) for task in spec.all_tasks],
-        "step_limits": {str(length): limit for length, limit in spec.step_limits.items()},
-        "tables": [to_plain(table) | _title(spec, table) for table in spec.tables],
-        "spec": plain_spec(spec),
-    }
-
-
-def _title(spec: Spec, table: TableSpec) -> Plain:
-    """A table's title, which names its data where they are not the benchmark's usual ones."""
-    label = KITS[spec.benchmark].label(spec.data)
-    return {"title": f"{table.title or spec.title} ({label})"} if label else {}
 
 
 class Named(Protocol):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from analysis.schema import PROVENANCE
 from orchestrator.tracking.receipt import (
     Receipt,
     Status,
@@ -70,7 +71,7 @@ def publish(run_dir: Path, uri: str, *, finished: bool, failed: bool = False) ->
 
 
 def _publish(run_dir: Path, uri: str, status: Status) -> PublishOutcome:
-    if not (run_dir / "provenance.json").is_file():  # the work has not begun: nothing to show
+    if not (run_dir / PROVENANCE).is_file():  # the work has not begun: nothing to show
         return PublishOutcome(ok=True, skipped=True)
     wanted = Receipt(without_password(uri), news(run_dir), status)
     # Results that were complete stay so, whatever became of a later command that added nothing.

@@ -9,11 +9,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal
 
+from analysis.schema import DATASETS, EPISODES, PROVENANCE, SPEC, TRAINING
 from orchestrator.storage.store import write_atomically
 
 Status = Literal["RUNNING", "FINISHED", "FAILED"]
 
-DATED = ("provenance.json", "report/index.html")
+DATED = (PROVENANCE, "report/index.html")
 """Files that tell when they were written, and so cannot tell whether there is anything new."""
 
 
@@ -28,7 +29,7 @@ class Receipt:
 
 def published_files(run_dir: Path) -> dict[str, Path]:
     """All files that the view is made from, by their path inside the run directory."""
-    names = ("spec.json", "provenance.json", "training.json", "datasets.json", "episodes.parquet")
+    names = (SPEC, PROVENANCE, TRAINING, DATASETS, EPISODES)
     paths = [run_dir / name for name in names] + sorted((run_dir / "report").rglob("*"))
     return {str(path.relative_to(run_dir)): path for path in paths if path.is_file()}
 

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from analysis.schema import RunSpec, leaves
+from analysis.schema import DATASETS, EPISODES, PROVENANCE, SPEC, TRAINING, RunSpec, leaves
 from orchestrator.tracking.metrics import Curves, finite, learning_curves, reported, seed_scores
 from orchestrator.tracking.names import allowed_name, short_text
 from orchestrator.tracking.receipt import Status, digest, published_files
@@ -46,9 +46,9 @@ class RunView:
 
 def read_views(run_dir: Path, status: Status) -> list[RunView]:
     """The parent's view, then one for each (method, seed) that there is something to show of."""
-    plain = json.loads((run_dir / "spec.json").read_text())
-    provenance = json.loads((run_dir / "provenance.json").read_text())
-    training = _read_json(run_dir / "training.json", [])
+    plain = json.loads((run_dir / SPEC).read_text())
+    provenance = json.loads((run_dir / PROVENANCE).read_text())
+    training = _read_json(run_dir / TRAINING, [])
     spec = RunSpec.from_dict(plain)
     parent = RunView(
         name=f"{spec.name} {spec.scale}",
@@ -64,11 +64,11 @@ def read_views(run_dir: Path, status: Status) -> list[RunView]:
             *(reported(run_dir / "report", entry.id) for entry in spec.tables),
         ),
         curves={},
-        datasets=_read_json(run_dir / "datasets.json", []),
+        datasets=_read_json(run_dir / DATASETS, []),
         files={
             name: path
             for name, path in published_files(run_dir).items()
-            if name in ("spec.json", "provenance.json") or name.startswith("report/")
+            if name in (SPEC, PROVENANCE) or name.startswith("report/")
         },
     )
     episodes = _read_episodes(run_dir)
@@ -127,7 +127,7 @@ def _read_episodes(run_dir: Path) -> pd.DataFrame:
 
     from analysis.episodes import COLUMNS
 
-    path = run_dir / "episodes.parquet"
+    path = run_dir / EPISODES
     return pd.read_parquet(path) if path.is_file() else pd.DataFrame(columns=COLUMNS)
 
 

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from analysis.schema import SPEC
 from orchestrator.tracking.stores import TrackingError
 from orchestrator.tracking.views import IDENTITY, RUN_ID, RunView
 
@@ -31,7 +32,7 @@ class Publisher:
         self._client = client
         self._experiment = experiment
         self._deadline = time.monotonic() + PUBLISH_SECONDS
-        self._began = int(files["spec.json"].stat().st_mtime * 1000)
+        self._began = int(files[SPEC].stat().st_mtime * 1000)
         self._ended = int(max(path.stat().st_mtime for path in files.values()) * 1000)
         self._found: dict[tuple[str, ...], list[Run]] = defaultdict(list)
         query = f"tags.`{RUN_ID}` = '{run_id}'"

@@ -8,8 +8,8 @@ from functools import cached_property
 from itertools import chain, pairwise
 from typing import TypeVar
 
-from orchestrator.benchmarks.kit import TEACHING, Dataset, Illustration
-from orchestrator.benchmarks.registry import BENCHMARKS, KITS
+from orchestrator.benchmarks.entry import TRAINING_DATA, Dataset, Illustration
+from orchestrator.benchmarks.registry import BENCHMARKS, ENTRIES
 from orchestrator.spec.methods import SHARED, method_of, playing_modules, settings_with_effect
 from orchestrator.spec.spec import Spec
 from orchestrator.spec.structure import Plain, to_plain
@@ -45,7 +45,7 @@ class Recipes:
         """What skills and dynamics are learned from, where any method needs skills."""
         if not any(method_of(method).told for method in self.spec.methods):
             return
-        for role, one in self._kit_datasets.items():
+        for role, one in self._datasets_by_role.items():
             params = {"config": self.data_settings, **self.root, **one.params}
             self.datasets[role] = self.add(one.kind, params)
 
@@ -60,35 +60,37 @@ class Recipes:
 
     def add_illustrations(self) -> None:
         """What is looked at of MB-Stitch, with seed 0's models; of several, the first one's."""
-        ours = next((one for one in self.spec.methods if method_of(one) is MB_STITCH), None)
-        if ours is None:
+        mb_stitch = next((one for one in self.spec.methods if method_of(one) is MB_STITCH), None)
+        if mb_stitch is None:
             return
-        kit, data = KITS[self.spec.benchmark], {"config": to_plain(self.spec.data)}
-        extras = {role: self.add(kind, data | self.root) for role, kind in kit.extras.items()}
-        models = {kind: self.models[kind, 0, ours] for kind in MB_STITCH.models}
+        entry, data = ENTRIES[self.spec.benchmark], {"config": to_plain(self.spec.data)}
+        extras = {role: self.add(kind, data | self.root) for role, kind in entry.extras.items()}
+        models = {kind: self.models[kind, 0, mb_stitch] for kind in MB_STITCH.models}
         there = models | self.datasets | extras
-        for name, one in kit.illustrations.items():
-            roles = [self.demonstrations if role == TEACHING else (role,) for role in one.inputs]
+        for name, one in entry.illustrations.items():
+            roles = [
+                self.demonstrations if role == TRAINING_DATA else (role,) for role in one.inputs
+            ]
             inputs = {role: there[role] for role in chain.from_iterable(roles)}
-            params = _illustrated(self.spec, one, ours)
+            params = _illustrated(self.spec, one, mb_stitch)
             self.illustrations[name] = self.add(one.kind, params, inputs)
 
     @property
     def demonstrations(self) -> dict[str, str]:
         """The datasets that skills are learned from: role → key."""
-        teaching = (role for role, one in self._kit_datasets.items() if one.teaches)
-        return {role: self.datasets[role] for role in teaching}
+        training = (role for role, one in self._datasets_by_role.items() if one.for_training)
+        return {role: self.datasets[role] for role in training}
 
     @cached_property
     def data_settings(self) -> Plain:
         """Settings of the data, but for those that nothing learned from depends on."""
-        looked_at = KITS[self.spec.benchmark].for_extras
+        looked_at = ENTRIES[self.spec.benchmark].for_extras
         settings = to_plain(self.spec.data)
         return {name: value for name, value in settings.items() if name not in looked_at}
 
     @cached_property
-    def _kit_datasets(self) -> dict[str, Dataset]:
-        return KITS[self.spec.benchmark].datasets(self.spec.data)
+    def _datasets_by_role(self) -> dict[str, Dataset]:
+        return ENTRIES[self.spec.benchmark].datasets(self.spec.data)
 
     def settings(self, method: str, expected: type[S]) -> S:
         """Of a method that asks for a model. Raises TypeError where they do not say how it is."""
@@ -136,7 +138,7 @@ def _mf_policy(recipes: Recipes, seed: int, method: str) -> str:
 
 def _single_policy(recipes: Recipes, seed: int, method: str) -> str:
     settings = recipes.settings(method, SinglePolicySettings)
-    kind = KITS[recipes.spec.benchmark].long_horizon(recipes.spec.data)
+    kind = ENTRIES[recipes.spec.benchmark].long_horizon(recipes.spec.data)
     shown = {"config": recipes.data_settings | {"episodes": settings.episodes}, **recipes.root}
     key = recipes.add(kind, shown | {"order": settings.order})
     recipes.long_horizon[f"demonstrations of {method}"] = key
@@ -154,21 +156,21 @@ MODELS: dict[str, Callable[[Recipes, int, str], str]] = {
 """How the recipe of a kind of model is made, for a seed and the method that asks for it."""
 
 
-def _illustrated(spec: Spec, illustration: Illustration, ours: str) -> Plain:
-    """Parameters of an illustration; one that plays a task does so by No-Stitch and `ours`.
+def _illustrated(spec: Spec, illustration: Illustration, mb_stitch: str) -> Plain:
+    """Parameters of an illustration; one that plays a task does so by No-Stitch and `mb_stitch`.
 
-    ours: an MB-Stitch. What takes stitches apart knows what No-Stitch is.
+    mb_stitch: one of its MB-Stitches. What takes stitches apart knows what No-Stitch is.
     """
-    settings = spec.method_settings(ours)
+    settings = spec.method_settings(mb_stitch)
     assert isinstance(settings, PlanningSettings)
     params: Plain = {
         "rollout": to_plain(spec.rollout),
         "step_limit": spec.step_limit,
         "root_seed": spec.root_seed,
         "seed": 0,
-        "code": code_fingerprint(tuple(sorted(playing_modules(ours, settings)))),
+        "code": code_fingerprint(tuple(sorted(playing_modules(mb_stitch, settings)))),
     }
-    played = [(ours, settings_with_effect(settings))]
+    played = [(mb_stitch, settings_with_effect(settings))]
     if illustration.pairs:
         return params | {
             "methods": played,

@@ -7,10 +7,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from orchestrator.benchmarks.registry import KITS
+from orchestrator.benchmarks.registry import ENTRIES
 from orchestrator.spec.methods import method_rollout
 from orchestrator.spec.spec import Spec
-from orchestrator.storage.ledger import Ledger, Played
+from orchestrator.storage.ledger import Ledger, PlayCounts
 from orchestrator.storage.store import CorruptArtifactError, Store
 from orchestrator.work.jobs import BlockTask
 from orchestrator.work.plan import Node, Plan
@@ -23,7 +23,7 @@ Standing = Literal["found", "decided", "missing"]
 
 
 @dataclass(frozen=True)
-class Estimate:
+class CostEstimate:
     """What is there, what is missing, and what the missing will take at most."""
 
     artifacts: dict[str, tuple[int, int]]  # kind → found, missing
@@ -40,7 +40,7 @@ class Estimate:
     from_history: bool  # times measured on this store, not the reference
 
 
-def estimate(plan: Plan, store: Store, shared: Ledger) -> Estimate:
+def estimate(plan: Plan, store: Store, shared: Ledger) -> CostEstimate:
     """Look at store and ledger; runs nothing.
 
     How many episodes will survive to each block is what blocks like it have shown in this store;
@@ -73,7 +73,7 @@ def estimate(plan: Plan, store: Store, shared: Ledger) -> Estimate:
         for method in spec.methods
         for task in spec.all_tasks
     )
-    return Estimate(
+    return CostEstimate(
         artifacts={kind: (c[True], c[False]) for kind, c in artifacts.items()},
         blocks={method: dict(counts) for method, counts in blocks.items()},
         episodes=len(spec.all_tasks) * runs,
@@ -84,13 +84,13 @@ def estimate(plan: Plan, store: Store, shared: Ledger) -> Estimate:
         seconds_training=training,
         seconds_evaluation=evaluation,
         segments_missing=round(missing_segments),
-        disk_bytes=round(2 * KITS[spec.benchmark].costs.segment_bytes * missing_segments),
+        disk_bytes=round(2 * ENTRIES[spec.benchmark].costs.segment_bytes * missing_segments),
         from_history=any(task.kind in history for task in plan.tasks.values()),
     )
 
 
 @dataclass(frozen=True)
-class Place:
+class PlannedBlock:
     """A block of the tree, and what is known of it."""
 
     node: Node
@@ -99,7 +99,9 @@ class Place:
     arriving: float  # episodes expected to play it
 
 
-def standings(plan: Plan, shared: Ledger, history: Mapping[str, Played]) -> Iterator[Place]:
+def standings(
+    plan: Plan, shared: Ledger, history: Mapping[str, PlayCounts]
+) -> Iterator[PlannedBlock]:
     """Every block of a plan, and whether it is there, not needed, or to be played.
 
     A block is decided without being played where no episode survived a block above it. What lies
@@ -116,29 +118,29 @@ def standings(plan: Plan, shared: Ledger, history: Mapping[str, Played]) -> Iter
                 outcome = next((outcome for _, outcome in shared.outcomes([task.key])), None)
                 standing = "missing" if outcome is None else "found"
                 below = "missing" if outcome is None else None if outcome.survivors else "decided"
-            yield Place(node, task, standing, arriving)
+            yield PlannedBlock(node, task, standing, arriving)
             surviving = arriving * _success_rate(task, history)
             if standing == "found" and outcome is not None:
                 surviving = outcome.survivors
             waiting.extend((child, below, surviving) for child in plan.children.get(node, []))
 
 
-def _success_rate(task: BlockTask, history: Mapping[str, Played]) -> float:
+def _success_rate(task: BlockTask, history: Mapping[str, PlayCounts]) -> float:
     known = history.get(task.kind)
-    return KITS[task.benchmark].costs.success if known is None else known.success_rate
+    return ENTRIES[task.benchmark].costs.success if known is None else known.success_rate
 
 
-def seconds_each(task: BlockTask, history: Mapping[str, Played]) -> float:
+def seconds_each(task: BlockTask, history: Mapping[str, PlayCounts]) -> float:
     """What a segment of a block is expected to take a worker."""
     if task.kind in history:
         return history[task.kind].seconds_each
-    costs = KITS[task.benchmark].costs
+    costs = ENTRIES[task.benchmark].costs
     plans = isinstance(task.settings, PlanningSettings)
     return costs.planned_segment if plans else costs.segment
 
 
 def _reference_seconds(recipe: Recipe) -> float:
-    costs, config = KITS[recipe.params["benchmark"]].costs, recipe.params.get("config", {})
+    costs, config = ENTRIES[recipe.params["benchmark"]].costs, recipe.params.get("config", {})
     if recipe.kind in costs.update:
         return costs.update[recipe.kind] * float(config["updates"])
     if recipe.kind in costs.demonstration:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from orchestrator.executors.protocol import Executor
-from orchestrator.storage.ledger import Ledger, Outcome, Played
+from orchestrator.storage.ledger import Ledger, Outcome, PlayCounts
 from orchestrator.storage.store import Store
 from orchestrator.work.costs import seconds_each
 from orchestrator.work.jobs import ATTEMPTS, BlockReport, BlockTask, PlayJob, Report
@@ -32,7 +32,7 @@ class Evaluation:
     seconds: float = 0.0  # that workers were busy playing
     _ready: deque[tuple[Node, int]] = field(default_factory=deque)
     _in_flight: int = 0
-    _history: dict[str, Played] = field(default_factory=dict)
+    _history: dict[str, PlayCounts] = field(default_factory=dict)
     _attempts: dict[str, int] = field(default_factory=dict)  # failed ones, of this command
     _given_up: set[str] = field(default_factory=set)
     _alone: set[str] = field(default_factory=set)  # blocks whose worker died: to be sent singly
@@ -144,11 +144,11 @@ class Evaluation:
 
     def _remember(self, job: PlayJob, reports: Iterable[BlockReport]) -> None:
         kinds = {task.key: task.kind for task, _ in job.tasks}
-        sums: dict[str, Played] = {}
+        sums: dict[str, PlayCounts] = {}
         for block in reports:
             if block.outcome is not None:
                 successes = Outcome.from_bytes(block.outcome).survivors
-                played = Played(block.segments, successes, block.seconds)
+                played = PlayCounts(block.segments, successes, block.seconds)
                 kind = kinds[block.key]
                 sums[kind] = sums[kind] + played if kind in sums else played
         for kind, played in sums.items():

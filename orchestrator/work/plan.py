@@ -126,13 +126,13 @@ class Plan:
         return (node for node in self.nodes if node.parent is None)
 
     @cached_property
-    def method_envs(self) -> dict[str, MethodBlocks]:
+    def method_blocks(self) -> dict[str, MethodBlocks]:
         """By method: a paper's table has a hundred thousand blocks, and few methods."""
         methods = dict.fromkeys(node.method for node in self.nodes)
         return {method: MethodBlocks.of(self.spec, method) for method in methods}
 
     def _task(self, node: Node, episodes: tuple[int, int]) -> BlockTask:
-        alike = self.method_envs[node.method]
+        alike = self.method_blocks[node.method]
         place: dict[str, Any] = {
             "benchmark": self.spec.benchmark,
             "root_seed": self.spec.root_seed,

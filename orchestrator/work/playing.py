@@ -18,7 +18,7 @@ from orchestrator.work.jobs import BlockReport, BlockTask, PlayJob, Report
 from stitching.envs.protocol import VectorEnv
 from stitching.methods.protocol import Models
 from stitching.models.agent import Agent
-from stitching.rollout import begin, play_segment
+from stitching.rollout import Block, begin, play_segment
 
 
 class BlockPlayer:

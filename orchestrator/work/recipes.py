@@ -64,7 +64,7 @@ def code_fingerprint(modules: tuple[str, ...], beside: tuple[str, ...] = ()) -> 
     to a planner retrains nothing, and an edit to IQL retrains exactly what IQL made.
 
     Of a module of another package all of that package counts, its compiled modules and its version
-    included: what is needed of it is not ours to say.
+    included: what is needed of it is not for us to say.
     """
     names = [name for name in modules if _is_ours(name)]
     others = _Distribution.of(frozenset(set(modules) - set(names)))
@@ -87,7 +87,7 @@ class _Distribution:
     """All that other packages bring with some of their modules."""
 
     content: Plain  # versions by distribution, hashes by file
-    asks_for: tuple[str, ...]  # modules of ours that theirs import
+    asks_for: tuple[str, ...]  # modules of this package that theirs import
 
     @classmethod
     def of(cls, modules: frozenset[str]) -> _Distribution:
@@ -139,7 +139,7 @@ class _Code:
     """What fingerprints ask of a module; many share one."""
 
     syntax: str  # hash of its syntax tree without docstrings
-    imports: frozenset[str]  # modules of ours
+    imports: frozenset[str]  # modules of this package
 
     @classmethod
     def of(cls, file: Path) -> _Code:
@@ -156,7 +156,7 @@ def _code(module: str) -> _Code:
 
 
 def _named_imports(tree: ast.Module) -> set[str]:
-    """Modules of ours that are imported, in any form and anywhere in a module."""
+    """Modules of this package that are imported, in any form and anywhere in a module."""
     named: set[str] = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):

@@ -1,10 +1,11 @@
 """Corrective labels: the robot is displaced, and its action brings it back to the demonstration.
 
-A policy that imitates steady hands knows nothing of the states beside theirs: on Kitchen's expert
-data it fails most of the time where the arm's joints are off by 0.06 rad. How the robot moves can
-be learned from the same data, and so can the action that would have brought it back. After Ke et
-al. (2024), CCIL: Continuity-based Data Augmentation for Corrective Imitation Learning, which finds
-such labels with learned dynamics. Here a linear model of the robot alone serves.
+A policy that imitates steady demonstrators knows nothing of the states beside theirs: on
+Kitchen's expert data it fails most of the time where the arm's joints are off by 0.06 rad. How the
+robot moves can be learned from the same data, and so can the action that would have
+brought it back. After Ke et al. (2024), CCIL: Continuity-based Data Augmentation for Corrective
+Imitation Learning, which finds such labels with learned dynamics. Here a linear model of the robot
+alone serves.
 """
 
 from __future__ import annotations

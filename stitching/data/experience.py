@@ -40,39 +40,41 @@ def skill_experience(data: Transitions, conditions: np.ndarray) -> Experience:
     The paper gives no rewards; with this one V(s) is γ to the number of steps still needed, so
     the skills' values share one scale. conditions: (skills, condition) float32.
     """
-    pieces = []
+    trajectories = []
     starts = data.episode_starts
     for episode in np.flatnonzero(data.episode_skills >= 0):
         rows = np.arange(starts[episode], data.episode_ends[episode])
         succeeds = data.episode_successes[episode]
-        pieces.append(Piece(rows, data.episode_skills[episode], float(succeeds), ends=succeeds))
-    return gather(data, conditions, pieces)
+        trajectories.append(
+            Trajectory(rows, data.episode_skills[episode], float(succeeds), terminal=succeeds)
+        )
+    return gather(data, conditions, trajectories)
 
 
 @dataclass(frozen=True)
-class Piece:
-    """Consecutive rows under one condition, and what their last transition means."""
+class Trajectory:
+    """Consecutive rows learned from under one condition, and what their last transition means."""
 
     rows: np.ndarray
     condition_id: int
     reward: float  # for the last transition; the others have none
-    ends: bool  # nothing is bootstrapped beyond it
+    terminal: bool  # nothing is bootstrapped beyond it
 
 
-def gather(data: Transitions, conditions: np.ndarray, pieces: list[Piece]) -> Experience:
-    """The pieces one after the other; DataError if there are none."""
-    if not pieces:
+def gather(data: Transitions, conditions: np.ndarray, trajectories: list[Trajectory]) -> Experience:
+    """The trajectories one after the other; DataError if there are none."""
+    if not trajectories:
         raise DataError("the dataset demonstrates no skill: nothing to learn from")
-    lengths = [len(piece.rows) for piece in pieces]
+    lengths = [len(trajectory.rows) for trajectory in trajectories]
     last = np.cumsum(lengths) - 1
     rewards = np.zeros(sum(lengths), dtype=np.float32)
-    rewards[last] = [piece.reward for piece in pieces]
+    rewards[last] = [trajectory.reward for trajectory in trajectories]
     terminals = np.zeros(sum(lengths), dtype=bool)
-    terminals[last] = [piece.ends for piece in pieces]
+    terminals[last] = [trajectory.terminal for trajectory in trajectories]
     return Experience(
         data,
-        np.concatenate([piece.rows for piece in pieces]),
-        np.repeat([piece.condition_id for piece in pieces], lengths),
+        np.concatenate([trajectory.rows for trajectory in trajectories]),
+        np.repeat([trajectory.condition_id for trajectory in trajectories], lengths),
         conditions,
         rewards,
         terminals,

@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from stitching.data.experience import Experience, Piece, gather
+from stitching.data.experience import Experience, Trajectory, gather
 from stitching.data.transitions import Transitions
 
 Mixture = Literal["halves", "joined", "next-reward", "next-skill", "fine-tuned"]
@@ -38,11 +38,15 @@ def halves(data: Transitions, conditions: np.ndarray, gamma: float) -> Experienc
     state from which no action was ever seen, makes the values diverge.
     """
     episodes = _episodes(data, len(conditions))
-    pieces = []
+    trajectories = []
     for pair, (previous, following) in enumerate(skill_pairs(len(conditions))):
-        pieces += [Piece(_second(rows), pair, 0, ends=True) for rows in episodes[previous]]
-        pieces += [Piece(_first(rows), pair, 1, ends=True) for rows in episodes[following]]
-    return gather(data, _of_both_skills(conditions), pieces)
+        trajectories += [
+            Trajectory(_second(rows), pair, 0, terminal=True) for rows in episodes[previous]
+        ]
+        trajectories += [
+            Trajectory(_first(rows), pair, 1, terminal=True) for rows in episodes[following]
+        ]
+    return gather(data, _of_both_skills(conditions), trajectories)
 
 
 def joined(data: Transitions, conditions: np.ndarray, gamma: float) -> Experience:
@@ -55,14 +59,14 @@ def joined(data: Transitions, conditions: np.ndarray, gamma: float) -> Experienc
     episodes = _episodes(data, len(conditions))
     leaving: list[int] = []  # rows whose observation and action a joint has
     arriving: list[int] = []  # rows whose observation it is said to lead to
-    pieces = []
+    trajectories = []
     for pair, (previous, following) in enumerate(skill_pairs(len(conditions))):
         for before, after in _matched(episodes[previous], episodes[following]):
             joint = len(data) + len(leaving)
             leaving.append(before[-1])
             arriving.append(after[0])
             rows = np.concatenate([_second(before)[:-1], [joint], _first(after)])
-            pieces.append(Piece(rows, pair, 1, ends=True))
+            trajectories.append(Trajectory(rows, pair, 1, terminal=True))
     seen = data.observations
     with_joints = replace(
         data,
@@ -70,7 +74,7 @@ def joined(data: Transitions, conditions: np.ndarray, gamma: float) -> Experienc
         actions=np.concatenate([data.actions, data.actions[leaving]]),
         next_observations=np.concatenate([data.next_observations, seen[arriving]]),
     )
-    return gather(with_joints, _of_both_skills(conditions), pieces)
+    return gather(with_joints, _of_both_skills(conditions), trajectories)
 
 
 def next_reward(data: Transitions, conditions: np.ndarray, gamma: float) -> Experience:
@@ -115,13 +119,15 @@ def _with_next_reward(
     data: Transitions, conditions: np.ndarray, skills: int, gamma: float
 ) -> Experience:
     episodes = _episodes(data, skills)
-    pieces = []
+    trajectories = []
     for pair, (previous, following) in enumerate(skill_pairs(skills)):
-        pieces += [Piece(_second(rows), pair, 0, ends=True) for rows in episodes[previous]]
+        trajectories += [
+            Trajectory(_second(rows), pair, 0, terminal=True) for rows in episodes[previous]
+        ]
         for rows in episodes[following]:
             to_come = gamma ** len(_second(rows))
-            pieces.append(Piece(_first(rows), pair, to_come, ends=True))
-    return gather(data, conditions, pieces)
+            trajectories.append(Trajectory(_first(rows), pair, to_come, terminal=True))
+    return gather(data, conditions, trajectories)
 
 
 def _episodes(data: Transitions, skills: int) -> list[list[np.ndarray]]:

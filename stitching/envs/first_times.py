@@ -10,7 +10,7 @@ from stitching.envs.protocol import VectorEnv
 
 
 class FirstTimes:
-    """An environment for policies that are not told which skill is asked for, and may be ahead of it.
+    """For policies that are not told which skill is asked for, and may be ahead of it.
 
     A goal that has held before the skill was asked for counts as not achieved, also where it holds
     again: some come undone, as the kettle's when the hand leaves it. Snapshots say what has held,
@@ -49,6 +49,4 @@ class FirstTimes:
 
     def _holding(self, rows: np.ndarray) -> np.ndarray:
         """Which goals hold now: (n, skills) bool."""
-        return np.stack(
-            [self._env.achieved(rows, skill) for skill in range(self._skills)], axis=1
-        )
+        return np.stack([self._env.achieved(rows, skill) for skill in range(self._skills)], axis=1)

@@ -17,7 +17,7 @@ from stitching.models.agent import Agent
 from stitching.models.dynamics import Dynamics
 from stitching.planning.imagining import imagined
 from stitching.planning.objective import Norm, Price, conservative_value
-from stitching.planning.protocol import Plan, Score
+from stitching.planning.protocol import PlannedActions, Score
 
 
 @dataclass(frozen=True)
@@ -68,12 +68,14 @@ class MBStitch:
     ) -> Proposal:
         return self.proposal(self.plan(states, following, streams), states, following)
 
-    def plan(self, states: Tensor, following: int, streams: Sequence[np.random.Generator]) -> Plan:
+    def plan(
+        self, states: Tensor, following: int, streams: Sequence[np.random.Generator]
+    ) -> PlannedActions:
         """The plan from each of the states (n, observation) that promises most by Eq. 2."""
         score = self.score(states, following)
         return self.settings.chosen.plan(score, streams, self.models.actions)
 
-    def proposal(self, plan: Plan, states: Tensor, following: int) -> Proposal:
+    def proposal(self, plan: PlannedActions, states: Tensor, following: int) -> Proposal:
         """What is carried out of the plan, and from which of the states."""
         actions = plan.actions[:, : self.settings.execute].numpy()
         if not self.settings.selective:

@@ -17,8 +17,8 @@ from stitching.bounds import (
     ShareBelowOne,
 )
 from stitching.envs.protocol import ActionSpace
-from stitching.planning.protocol import Plan, Score
-from stitching.planning.ranking import rankable
+from stitching.planning.protocol import PlannedActions, Score
+from stitching.planning.ranking import sortable
 
 SMALLEST = 1e-3  # share of the weights that not the best elite has, below which it is alone
 
@@ -75,7 +75,7 @@ class CEM(Bounded):
     @torch.no_grad()
     def plan(
         self, score: Score, streams: Sequence[np.random.Generator], actions: ActionSpace
-    ) -> Plan:
+    ) -> PlannedActions:
         if not self.can_search(actions):
             raise ValueError("CEM samples Gaussians: use RandomShooting for discrete actions")
         problems = torch.arange(len(streams))
@@ -90,7 +90,7 @@ class CEM(Bounded):
             noise = self._noise([streams[problem] for problem in still_open.tolist()], actions.size)
             mean_t, std_t = mean[still_open], std[still_open]
             samples = (mean_t[:, None] + std_t[:, None] * noise).clamp(-1, 1)
-            scores = rankable(score(still_open, samples), still_open)
+            scores = sortable(score(still_open, samples), still_open)
             elite_mean, elite_std = self._fit(samples, scores, t)
             mean[still_open] = self.momentum * mean_t + (1 - self.momentum) * elite_mean
             std[still_open] = self.momentum * std_t + (1 - self.momentum) * elite_std
@@ -98,8 +98,8 @@ class CEM(Bounded):
             still_open = still_open[std[still_open].amax(dim=(1, 2)) >= self.tolerance]
 
         mean.clamp_(-1, 1)  # the average of actions at the bound may be rounded past it
-        objective = rankable(score(problems, mean[:, None]), problems)[:, 0]
-        return Plan(mean, objective, iterations)
+        objective = sortable(score(problems, mean[:, None]), problems)[:, 0]
+        return PlannedActions(mean, objective, iterations)
 
     def _noise(self, streams: Sequence[np.random.Generator], size: int) -> Tensor:
         """(problems, population, horizon, action) from N(0, 1), row by row from its own stream."""

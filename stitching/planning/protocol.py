@@ -23,7 +23,7 @@ scores:   (open, population) float32, on the CPU.
 
 
 @dataclass(frozen=True)
-class Plan:
+class PlannedActions:
     """The outcome of planning, one row a problem."""
 
     actions: Tensor  # (problems, horizon, action) float32: what to execute
@@ -54,7 +54,7 @@ class Planner(Protocol):
 
     def plan(
         self, score: Score, streams: Sequence[np.random.Generator], actions: ActionSpace
-    ) -> Plan:
+    ) -> PlannedActions:
         """One plan for each stream.
 
         A problem draws from its own stream only, and only as much as it needs itself, so its

@@ -9,8 +9,8 @@ from torch import Tensor
 
 from stitching.bounds import Bounded, Count, Few
 from stitching.envs.protocol import ActionSpace
-from stitching.planning.protocol import Plan, Score
-from stitching.planning.ranking import rankable
+from stitching.planning.protocol import PlannedActions, Score
+from stitching.planning.ranking import sortable
 
 
 @dataclass(frozen=True)
@@ -30,12 +30,14 @@ class RandomShooting(Bounded):
     @torch.no_grad()
     def plan(
         self, score: Score, streams: Sequence[np.random.Generator], actions: ActionSpace
-    ) -> Plan:
+    ) -> PlannedActions:
         problems = torch.arange(len(streams))
         sequences = self._draw(streams, actions)
-        scores = rankable(score(problems, sequences), problems)
+        scores = sortable(score(problems, sequences), problems)
         best = scores.argmax(dim=1)
-        return Plan(sequences[problems, best], scores[problems, best], torch.ones_like(problems))
+        return PlannedActions(
+            sequences[problems, best], scores[problems, best], torch.ones_like(problems)
+        )
 
     def _draw(self, streams: Sequence[np.random.Generator], actions: ActionSpace) -> Tensor:
         """(problems, population, horizon, action), row by row from its own stream."""

@@ -4,7 +4,7 @@ import torch
 from torch import Tensor
 
 
-def rankable(scores: Tensor, problems: Tensor) -> Tensor:
+def sortable(scores: Tensor, problems: Tensor) -> Tensor:
     """Scores with everything that is not finite at −∞, so that it loses to all that is.
 
     A learned model driven far outside its data may overflow. +∞ comes from that, not from a good

@@ -24,7 +24,7 @@ from stitching.methods.no_stitch import NoStitch
 from stitching.methods.protocol import Proposal, Stitcher
 from stitching.models.agent import Agent
 from stitching.planning.objective import NORMS, spread_over_members
-from stitching.planning.protocol import Plan
+from stitching.planning.protocol import PlannedActions
 from stitching.rollout import Block, Recorder, RolloutConfig, Segments, begin, play_segment
 from stitching.studies.demonstrated_states import DemonstratedStates
 
@@ -125,7 +125,7 @@ class StitchRecorder:
         self._expected = list(compress(expected, proposal.wanted))
         return proposal
 
-    def foresee(self, states: Tensor, following: int, plan: Plan) -> list[Numbers]:
+    def foresee(self, states: Tensor, following: int, plan: PlannedActions) -> list[Numbers]:
         """The three terms of Eq. 2 one action ahead, unweighted, and Eq. 2 at the plan's end.
 
         For each of the states (n, observation): "value" E[v(s')], "spread" Var(v(s')) and
@@ -172,7 +172,7 @@ class StitchRecorder:
 
 
 @torch.inference_mode()
-def anatomy(
+def study_stitches(
     studied: StudiedMethod, data: Transitions, pairs: Sequence[Pair], episodes: int
 ) -> dict[str, Any]:
     """The first `episodes` episodes of every pair of skills, with and without MB-Stitch, as JSON.

@@ -10,11 +10,11 @@ from orchestrator.spec.structure import Plain
 from sweeps.candidates import NO_STITCH
 from sweeps.player import SpecPlayer
 from sweeps.questions.question import SHOWN, Metric, Question
-from sweeps.scoring import Showing, pareto_front, play_candidates
+from sweeps.scoring import MeasuredGain, pareto_front, play_candidates
 from sweeps.space import Fields
 
 
-class GainQuestion(Question[Showing]):
+class GainQuestion(Question[MeasuredGain]):
     """Settings of MB-Stitch, and of models, beside No-Stitch under the base's models."""
 
     main = "gain"
@@ -36,12 +36,12 @@ class GainQuestion(Question[Showing]):
         base: Spec,
         candidates: Sequence[Fields],
         seeds: Sequence[int] | None,
-    ) -> list[Showing]:
+    ) -> list[MeasuredGain]:
         return play_candidates(player, base, candidates, seeds)
 
-    def again(self, found: Plain, showing: Showing, base: Showing, *names: str) -> Plain:
-        over_base = showing.gain_over(base.episodes, *names, "over the base")
-        again = showing.result(*names)
+    def again(self, found: Plain, measured: MeasuredGain, base: MeasuredGain, *names: str) -> Plain:
+        over_base = measured.gain_over(base.episodes, *names, "over the base")
+        again = measured.result(*names)
         return {
             "search_gain": found["gain"],
             "survives": again["gain"] / found["gain"] if found["gain"] > 0 else None,

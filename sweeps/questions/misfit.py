@@ -20,7 +20,7 @@ from orchestrator.errors import UsageError
 from orchestrator.spec.methods import method_label
 from orchestrator.spec.spec import Spec
 from orchestrator.spec.structure import Plain
-from sweeps.player import Played, SpecPlayer
+from sweeps.player import PlayedSpec, SpecPlayer
 from sweeps.questions.question import SHOWN, Metric, Question
 from sweeps.space import Fields, replaced
 
@@ -95,8 +95,8 @@ class MisfitQuestion(Question[Profiled]):
         player.prepare(specs, seeds)
         return [profiled(player.play(spec, seeds), spec.methods) for spec in specs]
 
-    def again(self, found: Plain, showing: Profiled, base: Profiled, *names: str) -> Plain:
-        return {"search_misfit": found["misfit"]} | showing.result(*names)
+    def again(self, found: Plain, measured: Profiled, base: Profiled, *names: str) -> Plain:
+        return {"search_misfit": found["misfit"]} | measured.result(*names)
 
     def headline(self, result: Plain) -> str:
         return (
@@ -139,7 +139,7 @@ class MisfitQuestion(Question[Profiled]):
         yield from _profiles(ranked[:PROFILES_SHOWN])
 
 
-def profiled(played: Played, methods: Sequence[str]) -> Profiled:
+def profiled(played: PlayedSpec, methods: Sequence[str]) -> Profiled:
     """What a setting's episodes come to."""
     means = played.episodes.groupby(["method", "length"])["score"].mean().reset_index()
     return Profiled(

@@ -24,7 +24,7 @@ class Metric:
     by_episode: bool = False  # a difference between single episodes, as a pruner compares them
 
 
-class Showing(Protocol):
+class Measured(Protocol):
     """How one setting did."""
 
     @property
@@ -38,7 +38,7 @@ class Showing(Protocol):
         """Place of a (task, episode) → what a pruner compares there; none if it cannot."""
 
 
-S = TypeVar("S", bound=Showing)
+S = TypeVar("S", bound=Measured)
 
 
 class Question(ABC, Generic[S]):
@@ -68,7 +68,7 @@ class Question(ABC, Generic[S]):
         """All candidates on the base's tasks and episodes, of all its seeds or some."""
 
     @abstractmethod
-    def again(self, found: Plain, showing: S, base: S, *names: str) -> Plain:
+    def again(self, found: Plain, measured: S, base: S, *names: str) -> Plain:
         """A trial that was played again, beside what the search found and the base's setting."""
 
     @abstractmethod

@@ -14,7 +14,7 @@ from analysis.figures.drawn import DRAWING
 from analysis.files import replaced_folder
 from analysis.report import export_results
 from analysis.results import check_results, provenance_text
-from analysis.schema import leaves
+from analysis.schema import PROVENANCE, leaves
 from analysis.tables.writers import to_csv
 from orchestrator.spec.structure import Plain
 from orchestrator.storage.rundir import RunDirectory
@@ -73,8 +73,8 @@ def write_report(
         check_results(results, results_names(sweep), sweep.extent, force)
         with replaced_folder(results / sweep.name) as folder:
             shutil.copytree(directory.path / "report", folder, dirs_exist_ok=True)
-            provenance = directory.read_json("provenance.json") or {}
-            _write(folder / "provenance.json", provenance_text(provenance, sweep.extent))
+            provenance = directory.read_json(PROVENANCE) or {}
+            _write(folder / PROVENANCE, provenance_text(provenance, sweep.extent))
 
 
 def field_importances(study: SweepStudy) -> dict[str, float]:

@@ -6,10 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from analysis.report import build_report
+from analysis.schema import PROVENANCE, SPEC
 from orchestrator.spec.spec import Spec
+from orchestrator.storage.claim import describe
 from orchestrator.storage.exports import write_readable
 from orchestrator.storage.provenance import provenance
-from orchestrator.storage.rundir import RunDirectory, describe
+from orchestrator.storage.rundir import RunDirectory
 from orchestrator.work.plan import make_plan
 from sweeps.candidates import NO_STITCH, group
 from sweeps.player import SpecPlayer
@@ -38,7 +40,7 @@ def write_table(sweep: SweepSpec, player: SpecPlayer, path: Path) -> None:
     player.play(spec)
     directory, plan = RunDirectory(path), replace(make_plan(spec), illustrations={})
     path.mkdir(parents=True, exist_ok=True)
-    directory.write_json("spec.json", describe(spec))
+    directory.write_json(SPEC, describe(spec))
     counts = write_readable(plan, player.store, player.ledger, directory)
-    directory.write_json("provenance.json", provenance() | {"counts": counts})
+    directory.write_json(PROVENANCE, provenance() | {"counts": counts})
     build_report(path)

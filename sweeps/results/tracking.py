@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 
-from analysis.schema import leaves
-from orchestrator.reproduce import NO_TRACKING
+from analysis.schema import SPEC, leaves
 from orchestrator.spec.structure import Plain
+from orchestrator.storage.claim import spec_of
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.tracking.metrics import finite
 from orchestrator.tracking.names import allowed_name, short_text
 from orchestrator.tracking.receipt import Status
+from orchestrator.tracking.run import NO_TRACKING
 from orchestrator.tracking.stores import connect, open_experiment, turn_to_write
 from orchestrator.tracking.views import RunView
 from orchestrator.tracking.writing import Publisher
@@ -42,7 +43,7 @@ class Tracker:
 
     def _publish(self, status: Status) -> None:
         directory = self._directory
-        names = ("spec.json", "sweep.json", "trials.json", "confirm.json", "winner.json")
+        names = (SPEC, "sweep.json", "trials.json", "confirm.json", "winner.json")
         files = {n: directory.path / n for n in names if (directory.path / n).is_file()}
         report = directory.path / "report"
         pages = {
@@ -64,7 +65,7 @@ class Tracker:
         children = [self._child(parent, t) for t in directory.read_json("trials.json") or []]
         with turn_to_write(self._uri):
             client = connect(self._uri)
-            benchmark = directory.spec().benchmark
+            benchmark = spec_of(directory).benchmark
             experiment = open_experiment(client, self._uri, f"skillstitch/{benchmark}")
             Publisher(client, experiment, files | pages, self._run_id).write(parent, children)
 

@@ -90,7 +90,7 @@ def kitchen_stitch(episode: int, without: bool, stitched: bool, worth: float) ->
     }  # fmt: skip
 
 
-def kitchen_anatomy() -> dict[str, Any]:
+def kitchen_stitches() -> dict[str, Any]:
     """Two stitches that helped, one that hurt, and one that had nothing to do."""
     nothing = kitchen_stitch(3, True, True, 0.0)
     for name in ("value", "spread", "distance"):
@@ -113,7 +113,7 @@ def kitchen_anatomy() -> dict[str, Any]:
 
 def kitchen_first_skills() -> dict[str, Any]:
     """The same, with stitches to first skills: two that hurt."""
-    study = kitchen_anatomy()
+    study = kitchen_stitches()
     firsts = [kitchen_stitch(episode, True, False, -1.0) | {"first": ""} for episode in (0, 1)]
     return study | {
         "pairs": [{"first": "", "second": "kettle", "arrived": 2}, *study["pairs"]],
@@ -138,7 +138,7 @@ def kitchen_files() -> dict[str, Any]:
             "accomplished_by_all": {"no-stitch": [1] * 10, "mb-stitch": [1, 1, *[2] * 8]},
             "episodes": [kitchen_episode("no-stitch", False), kitchen_episode("mb-stitch", True)],
         },
-        "anatomy": kitchen_anatomy(),
+        "stitches": kitchen_stitches(),
         "diagnosis": {
             "predictions": {
                 steps: {

@@ -13,11 +13,11 @@ from analysis.report import build_report, export_results
 from tests.analysis.kitchen_run import write_kitchen
 
 STUDIES = {
-    "pairs.csv", "pair-groups.csv", "models.csv", "anatomy.csv", "stitches.csv", "profile.csv",
-    "profile.md",
+    "pairs.csv", "pair-groups.csv", "models.csv", "stitch-outcomes.csv", "stitches.csv",
+    "profile.csv", "profile.md",
 }  # fmt: skip
 KITCHEN_FIGURES = {
-    "stitch-values", "contact-sheet", "pairs", "diagnosis", "diagnosis-values", "anatomy",
+    "stitch-values", "contact-sheet", "pairs", "diagnosis", "diagnosis-values", "stitch-outcomes",
 }  # fmt: skip
 
 

@@ -155,7 +155,7 @@ class Setting:
 
 
 @dataclass
-class Tally:
+class Totals:
     """What one planner took, and what its plans are worth."""
 
     seconds: float = 0.0  # of CPU
@@ -173,16 +173,16 @@ def measure(run: Path | None) -> Iterator[Result]:
     if not there:
         return
     setting = _setting(run)
-    ours, theirs = Tally(), [Tally() for _ in there]
+    ours, theirs = Totals(), [Totals() for _ in there]
     with torch.inference_mode():
         _warm_up(setting, there)
         for number, block in enumerate(setting.blocks):
             score = setting.exact.score(block.states, block.following)
             _ours(ours, setting.product, block, score, number)
-            for reference, tally in zip(there, theirs, strict=True):
-                _theirs(tally, reference, block, score, number)
-    for reference, tally in zip(there, theirs, strict=True):
-        yield from _compared(setting.title, ours, reference.title, tally)
+            for reference, totals in zip(there, theirs, strict=True):
+                _theirs(totals, reference, block, score, number)
+    for reference, totals in zip(there, theirs, strict=True):
+        yield from _compared(setting.title, ours, reference.title, totals)
 
 
 def _installed() -> Iterator[Reference]:
@@ -196,29 +196,31 @@ def _installed() -> Iterator[Reference]:
             print(f"{'reference':<12}no {reference.title}: {reference.install}")
 
 
-def _ours(tally: Tally, product: MBStitch, block: Problems, exact: Score, number: int) -> None:
+def _ours(totals: Totals, product: MBStitch, block: Problems, exact: Score, number: int) -> None:
     streams = [stream("planner", SEED, number, row) for row in range(len(block.states))]
     began = process_time()
     # What `propose` does before it keeps the first action.
     score = product.score(block.states, block.following)
     plan = product.planner.plan(score, streams, product.actions)
-    tally.seconds += process_time() - began
-    tally.iterations += plan.iterations.tolist()
-    tally.gains += [
+    totals.seconds += process_time() - began
+    totals.iterations += plan.iterations.tolist()
+    totals.gains += [
         _gain(partial(_of_one, exact, torch.tensor([row])), actions)
         for row, actions in enumerate(plan.actions)
     ]
 
 
-def _theirs(tally: Tally, reference: Reference, block: Problems, score: Score, number: int) -> None:
+def _theirs(
+    totals: Totals, reference: Reference, block: Problems, score: Score, number: int
+) -> None:
     for row in range(len(block.states)):
         objective = partial(_of_one, score, torch.tensor([row]))
         torch.manual_seed(number * len(block.states) + row)
         began = process_time()
         actions = reference.plan(objective, LIMITS.iterations)
-        tally.seconds += process_time() - began
-        tally.iterations.append(LIMITS.iterations)
-        tally.gains.append(_gain(objective, actions))
+        totals.seconds += process_time() - began
+        totals.iterations.append(LIMITS.iterations)
+        totals.gains.append(_gain(objective, actions))
 
 
 def _of_one(score: Score, problem: Tensor, actions: Tensor) -> Tensor:
@@ -236,12 +238,12 @@ def _warm_up(setting: Setting, references: list[Reference]) -> None:
     block = setting.blocks[0]
     product = replace(setting.product, planner=replace(LIMITS, iterations=2))
     score = setting.exact.score(block.states, block.following)
-    _ours(Tally(), product, block, score, 0)
+    _ours(Totals(), product, block, score, 0)
     for reference in references:
         reference.plan(partial(_of_one, score, torch.tensor([0])), 2)
 
 
-def _compared(models: str, ours: Tally, title: str, theirs: Tally) -> Iterator[Result]:
+def _compared(models: str, ours: Totals, title: str, theirs: Totals) -> Iterator[Result]:
     yield Result(
         "reference",
         f"{models}: plans/s of CPU, over {title}",

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.benchmarks.registry import KITS
+from orchestrator.benchmarks.registry import ENTRIES
 from orchestrator.builders.registry import BUILDERS
 from orchestrator.errors import UsageError
 from orchestrator.spec.spec import Spec, load_spec
-from orchestrator.storage.rundir import describe
+from orchestrator.storage.claim import describe
 from orchestrator.work.plan import Plan, make_plan
 from stitching.data.kitchen.demonstrations import KitchenDataConfig
 from stitching.envs.kitchen import SKILLS
@@ -27,10 +27,10 @@ def plan(spec: Spec) -> Plan:
 
 
 def test_every_kind_of_every_kit_can_be_made() -> None:
-    for kit in KITS.values():
-        kinds = {one.kind for one in kit.datasets(kit.data()).values()}
-        kinds |= {one.kind for one in kit.illustrations.values()} | set(kit.extras.values())
-        kinds |= {kit.long_horizon(kit.data())} - {""}
+    for entry in ENTRIES.values():
+        kinds = {one.kind for one in entry.datasets(entry.data()).values()}
+        kinds |= {one.kind for one in entry.illustrations.values()} | set(entry.extras.values())
+        kinds |= {entry.long_horizon(entry.data())} - {""}
         assert kinds <= BUILDERS.keys()
 
 
@@ -77,7 +77,7 @@ def test_more_held_out_data_retrain_nothing(spec: Spec, plan: Plan) -> None:
 
 
 def test_stitches_are_taken_apart_between_pairs_from_all_over_the_tasks(plan: Plan) -> None:
-    recipe = plan.recipes[plan.illustrations["anatomy"]]
+    recipe = plan.recipes[plan.illustrations["stitches"]]
     pairs = [tuple(pair) for pair in recipe.params["pairs"]]
     assert len(set(pairs)) == len(pairs) == 20
     assert {first for first, _ in pairs} == {second for _, second in pairs} == set(SKILLS)
@@ -89,7 +89,7 @@ def test_stitches_are_taken_apart_between_pairs_from_all_over_the_tasks(plan: Pl
 
 def test_few_pairs_are_all_taken_apart() -> None:
     plan = make_plan(load_spec("table3-can", "quick"))
-    params = plan.recipes[plan.illustrations["anatomy"]].params
+    params = plan.recipes[plan.illustrations["stitches"]].params
     assert [tuple(pair) for pair in params["pairs"]] == [("can", "can")]
     assert params["episodes"] == 30
 

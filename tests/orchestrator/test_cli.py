@@ -19,6 +19,7 @@ from analysis.results import provenance_text
 from orchestrator.cli import COMMANDS, main
 from orchestrator.errors import LockedError
 from orchestrator.spec.spec import Spec
+from orchestrator.storage.claim import claim_for_spec
 from orchestrator.storage.store import Artifact
 from orchestrator.work import playing
 from orchestrator.work.plan import Plan
@@ -399,7 +400,7 @@ def test_results_of_a_larger_run_stay(cli: Cli, place: Place, done: Place) -> No
 
 
 def test_report_of_a_run_that_has_not_played_yet(cli: Cli, spec: Spec, place: Place) -> None:
-    place.directory.settle(spec)
+    claim_for_spec(place.directory, spec)
     answer = cli("report", place.out)
     assert answer.code == 2
     assert "segments.parquet" in answer.err

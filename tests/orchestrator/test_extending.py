@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 from orchestrator.spec.spec import load_spec
-from orchestrator.storage.rundir import describe
+from orchestrator.storage.claim import describe
 from orchestrator.work.plan import make_plan
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "example-package"
@@ -108,7 +108,7 @@ def test_what_is_not_used_leaves_no_trace(place: Path) -> None:
     code = """
 import json
 from orchestrator.work.plan import make_plan
-from orchestrator.storage.rundir import describe
+from orchestrator.storage.claim import describe
 from orchestrator.spec.spec import load_spec
 spec = load_spec("table1", "smoke")
 plan = make_plan(spec)

@@ -119,8 +119,8 @@ def test_first_stitches_played_without_the_tree(
 
 def test_stitches_are_taken_apart(stitched_first: tuple[Plan, Place]) -> None:
     plan, place = stitched_first
-    anatomy = json.loads((place.out / "anatomy.json").read_text())
-    taken = [(pair["first"], pair["second"]) for pair in anatomy["pairs"]]
+    study = json.loads((place.out / "stitches.json").read_text())
+    taken = [(pair["first"], pair["second"]) for pair in study["pairs"]]
     pairs = list(dict.fromkeys(p for task in plan.spec.all_tasks for p in pairwise(task)))
     assert [pair for pair in taken if pair[0] != START] == pairs
     assert {pair for pair in taken if pair[0] == START} == {(START, first) for first, _ in pairs}
@@ -129,7 +129,7 @@ def test_stitches_are_taken_apart(stitched_first: tuple[Plan, Place]) -> None:
     )
     played_there = stitched.set_index(["prefix", "episode"])
     compared = 0
-    for stitch in anatomy["stitches"]:
+    for stitch in study["stitches"]:
         place_in_tree = stitch["second"], stitch["episode"]
         if stitch["first"] == START and place_in_tree in played_there.index:
             there = played_there.loc[place_in_tree]

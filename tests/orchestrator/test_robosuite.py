@@ -54,9 +54,9 @@ def test_a_task_from_data_to_report(
     assert len(episodes) == len(spec.methods) * spec.episodes
     diagnosis = json.loads((place.out / "diagnosis.json").read_text())
     assert set(diagnosis["competence"]) == set(spec.skill_names)
-    anatomy = json.loads((place.out / "anatomy.json").read_text())
-    assert [(pair["first"], pair["second"]) for pair in anatomy["pairs"]] == [task]
-    assert len(anatomy["stitches"]) == anatomy["pairs"][0]["arrived"]
+    study = json.loads((place.out / "stitches.json").read_text())
+    assert [(pair["first"], pair["second"]) for pair in study["pairs"]] == [task]
+    assert len(study["stitches"]) == study["pairs"][0]["arrived"]
     assert (place.out / "report" / f"{name}.md").is_file()
     showcase = json.loads((place.out / "showcase.json").read_text())
     shown = showcase["episodes"]

@@ -5,11 +5,11 @@ from dataclasses import replace
 import pytest
 
 from analysis.paper.numbers import paper_table
-from orchestrator.benchmarks.registry import KITS
+from orchestrator.benchmarks.registry import ENTRIES
 from orchestrator.errors import UsageError
 from orchestrator.spec.spec import Spec, load_spec
 from orchestrator.spec.tomls import Scale
-from orchestrator.storage.rundir import describe
+from orchestrator.storage.claim import describe
 from orchestrator.work.plan import Plan, make_plan
 
 METHOD = "single-policy"
@@ -103,4 +103,4 @@ def test_what_cannot_be_demonstrated_is_refused(spec: Spec) -> None:
     with pytest.raises(UsageError, match="these data of maze demonstrate no long task"):
         replace(load_spec("table1", "smoke"), methods=(METHOD,))
     people = replace(spec.data, source="human", human="D4RL/kitchen/complete-v2")
-    assert KITS["kitchen"].long_horizon(people) == ""
+    assert ENTRIES["kitchen"].long_horizon(people) == ""

@@ -264,7 +264,7 @@ from stitching.rollout import play_from_start
 torch.set_num_threads(1)
 maze, agent, stitchers, config, plays, step_limit = pickle.load(sys.stdin.buffer)
 outcomes = [
-    play_from_start(maze.block(), agent, stitchers[play.method], maze, config, play, step_limit)
+    play_from_start(maze.vector_env(), agent, stitchers[play.method], maze, config, play, step_limit)
     for play in plays
 ]
 pickle.dump(outcomes, sys.stdout.buffer)
@@ -441,8 +441,8 @@ def test_segments_have_the_declared_types(
 def test_nobody_plays(maze: Maze, agent: Agent, stitchers: dict[str, Stitcher]) -> None:
     for method in METHODS:
         (segments,) = play_from_start(
-            maze.vector_env(), agent, stitchers[method], maze, SAMPLED, play_of(method, TASKS[0], ()),
-            STEP_LIMIT,
+            maze.vector_env(), agent, stitchers[method], maze, SAMPLED,
+            play_of(method, TASKS[0], ()), STEP_LIMIT,
         )  # fmt: skip
         assert len(segments.success) == 0
         block = play_of(method, ("a", "b"), ())

@@ -7,7 +7,7 @@ import pandas as pd
 
 from orchestrator.spec.spec import load_spec
 from stitching.methods.mb_stitch import MBStitchSettings
-from sweeps.scoring import Showing
+from sweeps.scoring import MeasuredGain
 
 
 def test_an_interval_is_about_other_tasks_too() -> None:
@@ -21,8 +21,8 @@ def test_an_interval_is_about_other_tasks_too() -> None:
     gains = baseline["length"].where(baseline["task"] == tasks[0], 0)
     settings = cast(MBStitchSettings, load_spec("table1").method_settings("mb-stitch"))
     episodes = baseline.assign(accomplished=gains)
-    showing = Showing("mb-stitch", settings, pd.DataFrame(), episodes, baseline)
-    result = showing.result("test")
+    measured = MeasuredGain("mb-stitch", settings, pd.DataFrame(), episodes, baseline)
+    result = measured.result("test")
     assert (result["gain_low"], result["gain"], result["gain_high"]) == (0, 0.5, 1)
     assert result["tasks"] == {"g0>g1": 1.0, "g1>g0>g2": 0.0}
 
@@ -34,7 +34,7 @@ def test_first_skills_count_where_candidates_have_their_own() -> None:
     )
     settings = cast(MBStitchSettings, load_spec("table1").method_settings("mb-stitch"))
     episodes = baseline.assign(accomplished=[0, 1, 1])
-    shared = Showing("mb-stitch", settings, pd.DataFrame(), episodes, baseline)
+    shared = MeasuredGain("mb-stitch", settings, pd.DataFrame(), episodes, baseline)
     places = {("g0>g1", episode): episode for episode in range(3)}
     assert shared.instances(places) == {1: 0.5, 2: 0.0}
     assert replace(shared, own_first_skill=True).instances(places) == {0: 0.0, 1: 0.5, 2: 0.0}

@@ -11,7 +11,7 @@ from analysis.tables.rows import place_tasks
 from orchestrator.errors import UsageError
 from orchestrator.spec.spec import TableSpec, load_spec
 from orchestrator.spec.tomls import Scale
-from orchestrator.storage.rundir import describe
+from orchestrator.storage.claim import describe
 from sweeps.results.table import table_spec
 from sweeps.space import Dimension, replaced
 from sweeps.spec import (

@@ -46,7 +46,7 @@ Source = Literal["orders", "single-skill", "human"]
 
 @dataclass(frozen=True)
 class KitchenDataConfig(Bounded):
-    """Kitchen's demonstrations: which there are, how many, and how steady the hand is."""
+    """Kitchen's demonstrations: which there are, how many, and how good the demonstrator is."""
 
     source: Source = "orders"  # several skills in human orders, each alone, or people's recordings
     human: str = ""  # for people's: a Minari id such as D4RL/kitchen/complete-v2, or an .npz file
@@ -54,7 +54,7 @@ class KitchenDataConfig(Bounded):
     # First skill of an order → times as many demonstrations of it.
     first_weights: dict[str, NotNegative] = field(default_factory=dict)
     held_out: Amount = 8  # more of each order, to judge models by
-    quality: Share = 0.9  # of the hand: from 1, a steady expert, down to 0
+    quality: Share = 0.9  # of the demonstrator: from 1, an expert, down to 0
     qualities: dict[str, Share] = field(default_factory=dict)  # skill → another quality for it
     ease: Amount = 0  # steps in which the first movement gathers speed; people: some 15
     elsewhere: Share = 0.0  # share of later skills that begin at a free pose, not where one ended
@@ -74,12 +74,12 @@ class KitchenDataConfig(Bounded):
         return round(self.episodes * self.first_weights.get(order[0], 1.0))
 
     def style(self, skill: str) -> Style:
-        """How a demonstrator's hand varies in a skill."""
+        """How a demonstrator varies in a skill."""
         return style(self.qualities.get(skill, self.quality))
 
 
 class Demonstrator:
-    """The hand of one episode, going through an order of skills."""
+    """The demonstrator of one episode, going through an order of skills."""
 
     def __init__(self, order: Order, config: KitchenDataConfig, rng: np.random.Generator) -> None:
         self._todo, self._config, self._rng = list(order), config, rng
@@ -127,22 +127,22 @@ class Demonstrator:
         return np.clip(action + noise, -1, 1).astype(np.float32)
 
 
-def demonstrate(env: KitchenVectorEnv, hands: Sequence[Demonstrator]) -> list[Episode]:
-    """Let each hand go on from its episode's state, until it is done or gives up.
+def demonstrate(env: KitchenVectorEnv, demonstrators: Sequence[Demonstrator]) -> list[Episode]:
+    """Let each demonstrator go on from its episode's state, until it is done or gives up.
 
     Physics that diverge end their episode before the step that did it.
     """
-    arm, rows = Arm(), np.arange(len(hands))
+    arm, rows = Arm(), np.arange(len(demonstrators))
     seen = [[row] for row in env.observe(rows)]
     done = [[row] for row in _achieved(env, rows)]
     states = [[row] for row in env.snapshot(rows)]
-    acted: list[list[np.ndarray]] = [[] for _ in hands]
-    relocating: list[list[bool]] = [[] for _ in hands]
+    acted: list[list[np.ndarray]] = [[] for _ in demonstrators]
+    relocating: list[list[bool]] = [[] for _ in demonstrators]
     while len(rows):
         moves = {}
         for row in rows.tolist():
             arm.see(seen[row][-1])
-            action = hands[row].act(arm, done[row][-1])
+            action = demonstrators[row].act(arm, done[row][-1])
             if action is not None:
                 moves[row] = action
         if not moves:
@@ -159,7 +159,7 @@ def demonstrate(env: KitchenVectorEnv, hands: Sequence[Demonstrator]) -> list[Ep
         )
         for row, observation, achieved, state in after:
             acted[row].append(moves[row])
-            relocating[row].append(hands[row].relocating)
+            relocating[row].append(demonstrators[row].relocating)
             seen[row].append(observation)
             done[row].append(achieved)
             states[row].append(state)
@@ -198,8 +198,8 @@ def play(
     labels = [("demonstrations", "kitchen", seed, "-".join(order), e) for e in numbers]
     env = KITCHEN.vector_env()
     env.reset([stream("environment", *label) for label in labels])
-    hands = [Demonstrator(order, config, stream("hand", *label)) for label in labels]
-    return [cut(episode, order) for episode in demonstrate(env, hands)]
+    demonstrators = [Demonstrator(order, config, stream("hand", *label)) for label in labels]
+    return [cut(episode, order) for episode in demonstrate(env, demonstrators)]
 
 
 def kept(config: KitchenDataConfig, demonstrations: list[list[Segment]]) -> list[Segment]:

@@ -1,8 +1,8 @@
 """Demonstrations of one long task that nobody cuts into skills (paper 4.3.1, Single-Policy).
 
-The same hands as in the skills' data do four skills in a row. What is kept is the task as a whole:
-demonstrations that miss a skill, or do one out of turn, are left out, where the skills' data keep
-the skills before.
+The same demonstrators as in the skills' data do four skills in a row. What is kept is the task as
+a whole: demonstrations that miss a skill, or do one out of turn, are left out, where the skills'
+data keep the skills before.
 """
 
 from __future__ import annotations
@@ -53,5 +53,5 @@ def _played(config: KitchenDataConfig, order: Order, seed: int) -> Iterator[Epis
         numbers = range(first, min(first + TOGETHER, config.episodes))
         labels = [("long horizon", "kitchen", seed, "-".join(order), e) for e in numbers]
         env.reset([stream("environment", *label) for label in labels])
-        hands = [Demonstrator(order, config, stream("hand", *label)) for label in labels]
-        yield from demonstrate(env, hands)
+        demonstrators = [Demonstrator(order, config, stream("hand", *label)) for label in labels]
+        yield from demonstrate(env, demonstrators)

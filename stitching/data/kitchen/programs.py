@@ -1,4 +1,4 @@
-"""One waypoint program a skill, and how a hand plays it.
+"""One waypoint program a skill, and how a demonstrator carries it out.
 
 The numbers were read off the paths of people's hands where there are any (microwave, kettle, light
 switch, slide cabinet; Minari `D4RL/kitchen/complete-v2`) and off the model's geometry elsewhere.
@@ -30,7 +30,7 @@ class Waypoint:
 
 @dataclass(frozen=True)
 class Program:
-    """How a hand does one skill: waypoints about a site of the scene, and how it leaves."""
+    """How one skill is done: waypoints about a site of the scene, and how it leaves."""
 
     site: str
     waypoints: tuple[Waypoint, ...]
@@ -103,7 +103,7 @@ HOMED = 0.3  # rad of every joint from the start posture: close enough to set ou
 
 @dataclass(frozen=True)
 class Style:
-    """How a hand varies from attempt to attempt and from step to step."""
+    """How a demonstrator varies from attempt to attempt and from step to step."""
 
     jitter: float  # m, standard deviation of a loose waypoint
     slowest: float  # least factor on the programs' speeds; the greatest is 1.1
@@ -112,7 +112,7 @@ class Style:
 
 
 def style(quality: float) -> Style:
-    """From a steady expert, 1, to a hand that shakes and misses, 0."""
+    """From a steady expert, 1, to one who shakes and misses, 0."""
     sloppy = 1 - quality
     return Style(
         jitter=0.005 + 0.0225 * sloppy,

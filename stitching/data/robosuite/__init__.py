@@ -1,1 +1,1 @@
-"""Robosuite datasets: scripted demonstrations by hands of any quality."""
+"""Robosuite datasets: scripted demonstrations of any quality."""

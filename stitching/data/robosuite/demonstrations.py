@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from stitching.bounds import Amount, Bounded, Count, Episodes, Share
-from stitching.data.robosuite.programs import Hand, style
+from stitching.data.robosuite.programs import ScriptedDemonstrator, style
 from stitching.data.transitions import DataError, Transitions
 from stitching.envs.protocol import skill_index
 from stitching.envs.robosuite.can import Can
@@ -23,13 +23,13 @@ from stitching.streams import stream
 
 @dataclass(frozen=True)
 class RobosuiteDataConfig(Bounded):
-    """Robosuite's demonstrations: how many, and how steady the hand is."""
+    """Robosuite's demonstrations: how many, and how good the demonstrator is."""
 
-    quality: Share = 1.0  # of the hand: from 1, an expert, down to 0, who misses most of the time
+    quality: Share = 1.0  # of the demonstrator: from 1, an expert, down to 0, who often misses
     episodes: Episodes = 100  # demonstrations a skill
     held_out: Amount = 50  # more of each skill, to judge models by
     skill_steps: Count = 40  # actions after which a skill counts as missed
-    keep_failures: bool = True  # what a clumsy hand misses is data, too
+    keep_failures: bool = True  # what a poor demonstrator misses is data, too
 
 
 @dataclass(frozen=True)
@@ -67,14 +67,17 @@ def demonstrate(
     env = starts(benchmark, index).vector_env()
     env.reset([stream("environment", *label) for label in labels])
     manner = style(config.quality)
-    hands = [Hand(skill, benchmark.workspace, manner, stream("hand", *label)) for label in labels]
-    rows = np.arange(len(hands))
+    demonstrators = [
+        ScriptedDemonstrator(skill, benchmark.workspace, manner, stream("hand", *label))
+        for label in labels
+    ]
+    rows = np.arange(len(demonstrators))
     snapshots = env.snapshot(rows)
     seen = [[observation] for observation in env.observe(rows)]
-    acted: list[list[np.ndarray]] = [[] for _ in hands]
-    success = np.zeros(len(hands), dtype=bool)
+    acted: list[list[np.ndarray]] = [[] for _ in demonstrators]
+    success = np.zeros(len(demonstrators), dtype=bool)
     for _ in range(config.skill_steps):
-        actions = np.array([hands[row].act(seen[row][-1]) for row in rows])
+        actions = np.array([demonstrators[row].act(seen[row][-1]) for row in rows])
         env.step(rows, actions)
         sound = ~env.diverged[rows]
         rows, actions = rows[sound], actions[sound]
@@ -109,7 +112,7 @@ def held_out(
 ) -> tuple[Transitions, np.ndarray]:
     """Demonstrations that no model has seen, and the state each began in.
 
-    E episodes, those that missed included: where a clumsy hand succeeds are its easier starts.
+    E episodes, those that missed included: a poor demonstrator succeeds from its easier starts.
     Their snapshots: (E, snapshot) float64.
     """
     numbers = range(config.episodes, config.episodes + config.held_out)

@@ -29,15 +29,15 @@ class Waypoint:
     patience: int = 3  # actions
     least: int = 1  # actions, even if it is there at once: fingers need two to close
     world: bool = False  # `at` is a place in the world
-    loose: float = 1.0  # how freely a hand would vary it, against its jitter
+    loose: float = 1.0  # how freely a demonstrator would vary it, against its jitter
     holding: float = np.inf  # m, from the gripper to the object; if it is farther, it was missed
 
 
 W = Waypoint
 
-# A hand takes hold once it is about where it means to (m), and begins again when the can or the
-# handle's end is not with the gripper (m): what it shows has to follow from what it sees, or nobody
-# could learn it.
+# A demonstrator takes hold once it is about where it means to (m), and begins again when the can or
+# the handle's end is not with the gripper (m): what it shows has to follow from what it sees, or
+# nobody could learn it.
 BETWEEN, HELD = 0.025, 0.05
 
 
@@ -83,7 +83,7 @@ BACK_OFF = {"open door": (0.0, 0.14, 0.0), "close door": (0.0, 0.14, 0.0), "can"
 
 @dataclass(frozen=True)
 class Style:
-    """How a hand varies from attempt to attempt and from action to action."""
+    """How a demonstrator varies from attempt to attempt and from action to action."""
 
     jitter: float  # m, standard deviation of a waypoint
     noise: float  # of an action's numbers but the fingers', standard deviation
@@ -114,7 +114,7 @@ def object_frame(skill: str, observation: np.ndarray) -> tuple[np.ndarray, np.nd
     return door + turned @ REST, turned
 
 
-class Hand:
+class ScriptedDemonstrator:
     """Goes through a skill's program, sees where it got, and begins again after a miss."""
 
     def __init__(

@@ -1,4 +1,4 @@
-"""What a setting of the data leaves to stitch: rates of the hands, and of policies they teach.
+"""What a setting of the data leaves to stitch: rates of demonstrators and of policies.
 
     python -m stitching.data.robosuite.rates --task "open door,close door" --data.quality 0.3
 
@@ -68,17 +68,17 @@ def policy_rates(
 
 
 def lines(config: RatesConfig) -> Iterator[str]:
-    """One for the hands, then one for each training as it ends."""
+    """One for the demonstrators, then one for each training as it ends."""
     first, second = config.task.split(",")
     benchmark = CAN if first == CAN.skills[0].name else DOOR
     data = collect(benchmark, config.data, seed=0)
     experience = skill_experience(data, conditions(benchmark))
-    hands = {
+    demonstrators = {
         skill.name: data.episode_successes[data.episode_skills == index]
         for index, skill in enumerate(benchmark.skills)
     }
-    yield "hands: " + ", ".join(
-        f"{skill} {success.sum()} of {len(success)}" for skill, success in hands.items()
+    yield "demonstrators: " + ", ".join(
+        f"{skill} {success.sum()} of {len(success)}" for skill, success in demonstrators.items()
     )
     for seed in range(config.seeds):
         labels = ("agent", benchmark.name, 0, seed)

@@ -3,10 +3,10 @@
 from dataclasses import replace
 
 import pandas as pd
-from tests.analysis.test_profile import KETTLE, MICROWAVE, SPEC, play
 
 from analysis.page.profile import profile_markdown, profile_section
 from analysis.paper.profile import profile
+from tests.analysis.paper.test_profile import KETTLE, MICROWAVE, SPEC, play
 
 COLUMNS = ["seed", "method", "prefix", "depth", "episode", "success", "end_step"]
 

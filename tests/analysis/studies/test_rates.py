@@ -35,7 +35,7 @@ def merged_files() -> dict[str, Any]:
             for label, tasks in LEVELS.items()
         ],
     }
-    for name in ("anatomy", "diagnosis"):
+    for name in ("stitches", "diagnosis"):
         files[name] = {"parts": dict.fromkeys(LEVELS, files[name])}
     return files
 

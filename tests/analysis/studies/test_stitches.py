@@ -6,42 +6,42 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.figures.stitches import draw_anatomy
+from analysis.figures.stitches import draw_outcomes
 from analysis.figures.style import house_style
 from analysis.page.studies import stitches_section
 from analysis.run import Run, load_run
 from analysis.studies.stitches import (
     FIRST_SKILLS,
     HAND_OVERS,
-    anatomy_table,
     gains,
     outcome,
+    outcome_table,
     stitch_table,
 )
-from tests.analysis.kitchen_run import kitchen_anatomy, kitchen_first_skills, write_kitchen
+from tests.analysis.kitchen_run import kitchen_first_skills, kitchen_stitches, write_kitchen
 
 
 @pytest.fixture(params=["alone", "merged"])
 def run(request: pytest.FixtureRequest, tmp_path: Path, write_run: Any) -> Run:
     """A run of its own, or two merged, of which one has no stitches."""
-    study = kitchen_anatomy()
+    study = kitchen_stitches()
     if request.param == "merged":
         study = {"parts": {"level-1": study, "level-2": study | {"stitches": []}}}
-    return load_run(write_kitchen(write_run, tmp_path / "run", anatomy=study))
+    return load_run(write_kitchen(write_run, tmp_path / "run", stitches=study))
 
 
 def section(run: Run) -> str:
-    studies = {"anatomy": anatomy_table(run), "stitches": stitch_table(run)}
+    studies = {"stitch-outcomes": outcome_table(run), "stitches": stitch_table(run)}
     return stitches_section(run, studies)
 
 
 def test_outcomes_are_paired() -> None:
-    outcomes = [outcome(stitch) for stitch in kitchen_anatomy()["stitches"]]
+    outcomes = [outcome(stitch) for stitch in kitchen_stitches()["stitches"]]
     assert outcomes == ["helped", "helped", "hurt", "succeeded either way"]
 
 
 def test_gains_are_of_each_plan_s_first_action() -> None:
-    (_, _, hurt, nothing) = kitchen_anatomy()["stitches"]
+    (_, _, hurt, nothing) = kitchen_stitches()["stitches"]
     np.testing.assert_allclose(gains(hurt), [[1, -1], [1, -1]])
     assert gains(nothing).shape == (0, 2)
     skipped = hurt | {"plans": hurt["plans"][1:]}  # a plan of which more was carried out
@@ -49,8 +49,8 @@ def test_gains_are_of_each_plan_s_first_action() -> None:
 
 
 def test_a_part_in_numbers(run: Run) -> None:
-    table = anatomy_table(run)
-    assert table["part"].tolist() == list(run.anatomy)
+    table = outcome_table(run)
+    assert table["part"].tolist() == list(run.stitches)
     row = table.iloc[0]
     assert (row["episodes"], row["stitches"], row["plans"]) == (4, 3, 6)
     assert (row["successes_without"], row["successes_with"]) == (2, 3)
@@ -74,7 +74,7 @@ def test_the_page_has_a_line_for_each_part_and_outcome(run: Run) -> None:
     html = section(run)
     assert "2 of 4" in html
     assert "1 pair, 5 episodes of each" in html
-    for part in run.anatomy:
+    for part in run.stitches:
         name = f"{part}: {HAND_OVERS}" if part else HAND_OVERS
         assert f'<th scope="row">{name}</th>' in html
     assert "from the start" not in html
@@ -84,8 +84,8 @@ def test_the_page_has_a_line_for_each_part_and_outcome(run: Run) -> None:
 
 def test_first_skills_and_hand_overs_are_told_apart(tmp_path: Path, write_run: Any) -> None:
     study = kitchen_first_skills()
-    run = load_run(write_kitchen(write_run, tmp_path / "run", anatomy=study))
-    table = anatomy_table(run).set_index("kind")
+    run = load_run(write_kitchen(write_run, tmp_path / "run", stitches=study))
+    table = outcome_table(run).set_index("kind")
     assert table["stitches"].to_dict() == {FIRST_SKILLS: 2, HAND_OVERS: 3}
     assert table["hurt"].to_dict() == {FIRST_SKILLS: 2, HAND_OVERS: 1}
     assert np.isnan(table.loc[FIRST_SKILLS, "auc_value_spread"])  # all of them hurt
@@ -96,27 +96,27 @@ def test_first_skills_and_hand_overs_are_told_apart(tmp_path: Path, write_run: A
     for kind in (FIRST_SKILLS, HAND_OVERS):
         assert f'<th scope="row">{kind}</th>' in html
     with house_style():
-        figure = draw_anatomy(run.anatomy)
+        figure = draw_outcomes(run.stitches)
     assert len(figure.axes) == 2 * 4
     assert FIRST_SKILLS in figure.axes[0].get_ylabel()
 
 
 def test_nothing_was_stitched(tmp_path: Path, write_run: Any) -> None:
-    nothing = kitchen_anatomy() | {"stitches": []}
-    run = load_run(write_kitchen(write_run, tmp_path / "run", anatomy=nothing))
-    assert anatomy_table(run)["stitches"].tolist() == [0]
+    nothing = kitchen_stitches() | {"stitches": []}
+    run = load_run(write_kitchen(write_run, tmp_path / "run", stitches=nothing))
+    assert outcome_table(run)["stitches"].tolist() == [0]
     assert section(run) == ""
-    without = load_run(write_kitchen(write_run, tmp_path / "without", anatomy=None))
-    assert without.anatomy == {}
+    without = load_run(write_kitchen(write_run, tmp_path / "without", stitches=None))
+    assert without.stitches == {}
     assert stitches_section(without, {}) == ""
 
 
 def test_a_part_with_stitches_is_a_row_of_four_panels(run: Run) -> None:
     with house_style():
-        figure = draw_anatomy(run.anatomy)
+        figure = draw_outcomes(run.stitches)
     assert len(figure.axes) == 4
     value, distance, gain, _ = figure.axes
     assert len(value.lines) == 2 * 3
-    assert ("level-1" in value.get_ylabel()) == ("level-1" in run.anatomy)
+    assert ("level-1" in value.get_ylabel()) == ("level-1" in run.stitches)
     assert distance.get_xlim() == distance.get_ylim()
     assert gain.get_xlim() == gain.get_ylim()

@@ -15,14 +15,14 @@ from orchestrator.errors import ChangedError, IncompleteError, LockedError, Usag
 from orchestrator.reproduce_suite import reproduce_suite
 from orchestrator.spec.spec import TableSpec
 from orchestrator.spec.structure import to_plain
-from orchestrator.spec.suite import Suite, load_asked, part_directory
+from orchestrator.spec.suite import Suite, load_asked
 from orchestrator.storage.merge import (
     Naming,
-    anatomy_of_part,
     describe_suite,
     diagnosis_of_part,
     merge_again,
     showcase_of_part,
+    stitches_of_part,
 )
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.work import playing
@@ -162,7 +162,7 @@ def test_stopped_between_parts(finished: Path, tmp_path: Path) -> None:
     with mock.patch.object(carrying, "reproduce", dying), pytest.raises(KeyboardInterrupt):
         carry_out(levels(), tmp_path)
     directory = RunDirectory(tmp_path / "out")
-    assert part_directory(directory, "level-1").finished
+    assert directory.part("level-1").finished
     assert not directory.finished
     main(["report", str(tmp_path / "out")])
     assert "Partial table" in (tmp_path / "out" / "report" / "levels.md").read_text()
@@ -206,11 +206,11 @@ def test_stitches_taken_apart_are_kept_by_part(done: Path, tmp_path: Path) -> No
         "typical_distance": {"g1": 0.1},
     }
     directory = RunDirectory(done / "out")
-    part_directory(directory, "level-2").write_json("anatomy.json", study)
+    directory.part("level-2").write_json("stitches.json", study)
     merge_again(directory)
-    assert directory.read_json("anatomy.json") == {"parts": {"level-2": study}}
+    assert directory.read_json("stitches.json") == {"parts": {"level-2": study}}
     suite = lists(tmp_path)
-    renamed = anatomy_of_part(study, Naming(suite, suite.parts[0]))
+    renamed = stitches_of_part(study, Naming(suite, suite.parts[0]))
     assert renamed["pairs"] == [
         {"first": "", "second": "short:g1", "arrived": 1},
         {"first": "short:g0", "second": "short:g1", "arrived": 1},

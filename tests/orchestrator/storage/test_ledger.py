@@ -14,7 +14,7 @@ import pytest
 
 from orchestrator.errors import IncompleteError, NondeterminismError, StorageError
 from orchestrator.storage import ledger as ledgers
-from orchestrator.storage.ledger import SCHEMA, Ledger, Outcome, Played
+from orchestrator.storage.ledger import SCHEMA, Ledger, Outcome, PlayCounts
 
 
 @pytest.fixture
@@ -183,9 +183,9 @@ def test_failures_are_counted_across_sessions(ledger: Ledger) -> None:
 
 
 def test_history_adds_up(ledger: Ledger) -> None:
-    ledger.add_played("first skills", Played(10, 8, 1.0))
-    ledger.add_played("first skills", Played(30, 12, 1.0))
-    assert ledger.history() == {"first skills": Played(40, 20, 2.0)}
+    ledger.add_played("first skills", PlayCounts(10, 8, 1.0))
+    ledger.add_played("first skills", PlayCounts(30, 12, 1.0))
+    assert ledger.history() == {"first skills": PlayCounts(40, 20, 2.0)}
     assert ledger.history()["first skills"].seconds_each == 0.05
     assert ledger.history()["first skills"].success_rate == 0.5
 

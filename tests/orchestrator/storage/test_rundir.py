@@ -15,7 +15,8 @@ import pytest
 
 from orchestrator.errors import ChangedError, LockedError, StorageError, UsageError
 from orchestrator.spec.spec import Spec
-from orchestrator.storage.rundir import RunDirectory, default_out, describe
+from orchestrator.storage.claim import claim_for_spec, describe, spec_of
+from orchestrator.storage.rundir import RunDirectory, default_out
 from stitching.rollout import RolloutConfig
 from tests.orchestrator.tiny import Place
 
@@ -88,19 +89,19 @@ def test_a_place_that_cannot_be_a_directory(tmp_path: Path) -> None:
 
 
 def test_settling(directory: RunDirectory, spec: Spec) -> None:
-    run_id = directory.settle(spec)
-    assert directory.settle(spec) == run_id
-    assert directory.spec() == spec
-    assert RunDirectory(directory.path.with_name("other")).settle(spec) != run_id
+    run_id = claim_for_spec(directory, spec)
+    assert claim_for_spec(directory, spec) == run_id
+    assert spec_of(directory) == spec
+    assert claim_for_spec(RunDirectory(directory.path.with_name("other")), spec) != run_id
 
 
 def test_a_kill_while_settling(directory: RunDirectory, spec: Spec) -> None:
     """The spec is there, the identity is not: the directory was never used, anyone may have it."""
-    directory.settle(spec)
+    claim_for_spec(directory, spec)
     (directory.path / "identity.json").unlink()
     other = replace(spec, seeds=1)
-    directory.settle(other)
-    assert directory.spec() == other
+    claim_for_spec(directory, other)
+    assert spec_of(directory) == other
 
 
 def test_another_spec_is_refused_with_the_difference(done: Place, spec: Spec) -> None:
@@ -138,7 +139,7 @@ def test_another_version_is_refused_naming_it(done: Place, spec: Spec) -> None:
 
 def test_no_run_there(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=rf"{tmp_path} is no run directory"):
-        RunDirectory(tmp_path).spec()
+        spec_of(RunDirectory(tmp_path))
 
 
 def test_what_a_reader_finds_in_the_spec(spec: Spec) -> None:

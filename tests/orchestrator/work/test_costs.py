@@ -9,7 +9,7 @@ import pytest
 
 from orchestrator.printing import plan_lines
 from orchestrator.spec.spec import Spec
-from orchestrator.storage.ledger import Ledger, Outcome, Played
+from orchestrator.storage.ledger import Ledger, Outcome, PlayCounts
 from orchestrator.storage.store import Artifact, Store
 from orchestrator.work.costs import estimate, standings
 from orchestrator.work.plan import Node, Plan, make_plan
@@ -79,7 +79,7 @@ def test_found_artifacts_cost_nothing(plan: Plan, shared: Ledger, tmp_path: Path
 
 def test_times_come_from_this_stores_history(plan: Plan, shared: Ledger, tmp_path: Path) -> None:
     for kind in {task.kind for task in plan.tasks.values()}:
-        shared.add_played(kind, Played(segments=10, successes=10, seconds=20.0))
+        shared.add_played(kind, PlayCounts(segments=10, successes=10, seconds=20.0))
     costs = estimate(plan, Store(tmp_path), shared)
     assert costs.from_history
     assert costs.seconds_evaluation == pytest.approx(2.0 * costs.segments_in_tree)
@@ -90,7 +90,7 @@ def test_survivors_are_expected_as_they_were_before(
 ) -> None:
     """Half survive each skill: half of the second skills are played."""
     for kind in {task.kind for task in plan.tasks.values()}:
-        shared.add_played(kind, Played(segments=10, successes=5, seconds=10.0))
+        shared.add_played(kind, PlayCounts(segments=10, successes=5, seconds=10.0))
     first = sum(node.parent is None for node in plan.nodes)
     second = len(plan.nodes) - first
     costs = estimate(plan, Store(tmp_path), shared)
@@ -110,7 +110,7 @@ def test_first_skills_that_are_stitched_to_are_their_method_s(
     spec = first_stitch.spec
     for kind, successes in {"any method": 10, "mb-stitch": 5}.items():
         name = f"{spec.benchmark}, {kind}, skill 1"
-        shared.add_played(name, Played(segments=10, successes=successes, seconds=10.0))
+        shared.add_played(name, PlayCounts(segments=10, successes=successes, seconds=10.0))
     costs = estimate(first_stitch, Store(tmp_path), shared)
     blocks = len(first_stitch.chunks) * spec.seeds * len(spec.skill_names)
     assert costs.blocks[""] == {"missing": blocks}

@@ -15,7 +15,7 @@ from stitching.data.robosuite.demonstrations import (
     held_out,
     starts,
 )
-from stitching.data.robosuite.programs import PROGRAMS, Hand, object_frame, style
+from stitching.data.robosuite.programs import PROGRAMS, ScriptedDemonstrator, object_frame, style
 from stitching.data.transitions import DataError, check
 from stitching.envs.protocol import skill_index
 from stitching.envs.robosuite.can import CAN, Can
@@ -123,7 +123,7 @@ def test_a_hand_that_has_lost_its_hold_begins_again(skill: str) -> None:
     benchmark = BENCHMARK[skill]
     env = starts(benchmark, skill_index(benchmark, skill)).vector_env()
     env.reset([stream("hand")])
-    hand = Hand(skill, benchmark.workspace, style(EXPERT), stream("draws"))
+    hand = ScriptedDemonstrator(skill, benchmark.workspace, style(EXPERT), stream("draws"))
     closed = 0
     while closed < 4:  # two actions to take hold, and two more with it
         action = hand.act(env.observe(ROW)[0])

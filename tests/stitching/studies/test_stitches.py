@@ -16,7 +16,7 @@ from stitching.models.agent import Agent
 from stitching.planning.objective import spread_over_members
 from stitching.planning.random_shooting import RandomShooting
 from stitching.rollout import Block, RolloutConfig, play_from_start
-from stitching.studies.stitches import START, StudiedMethod, anatomy
+from stitching.studies.stitches import START, StudiedMethod, study_stitches
 
 EPISODES = 8
 PAIRS = [("b", "a"), ("b", "d"), ("d", "b")]
@@ -50,7 +50,7 @@ def studied(
 
 @pytest.fixture(scope="module")
 def study(studied: StudiedMethod, demonstrations: Transitions) -> dict[str, Any]:
-    return anatomy(studied, demonstrations, PAIRS, EPISODES)
+    return study_stitches(studied, demonstrations, PAIRS, EPISODES)
 
 
 @pytest.mark.parametrize("pair", STARTS + PAIRS)
@@ -90,7 +90,7 @@ def test_first_skills_are_taken_apart_only_where_they_are_stitched_to(
 ) -> None:
     between = replace(studied, rollout=RolloutConfig())
     assert any(s["plans"] for s in study["stitches"] if s["first"] == START)
-    without = anatomy(between, demonstrations, PAIRS, EPISODES)
+    without = study_stitches(between, demonstrations, PAIRS, EPISODES)
     pairs = [(pair["first"], pair["second"]) for pair in study["pairs"]]
     assert pairs == STARTS + PAIRS
     assert without["pairs"] == study["pairs"][len(STARTS) :]
@@ -117,7 +117,7 @@ def test_plans_are_written_down_as_eq_2_sees_them(
         studied.stitcher.settings, random_shooting=planner, alpha=2.0, beta=3.0, execute=1
     )
     stitcher = replace(studied.stitcher, settings=settings)
-    short = anatomy(replace(studied, stitcher=stitcher), demonstrations, PAIRS[:1], EPISODES)
+    short = study_stitches(replace(studied, stitcher=stitcher), demonstrations, PAIRS[:1], EPISODES)
     plans = [plan for stitch in short["stitches"] for plan in stitch["plans"]]
     assert plans
     for plan in plans:

@@ -15,12 +15,12 @@ from analysis.schema import RunSpec
 from orchestrator.errors import UsageError
 from orchestrator.spec.methods import first_method
 from orchestrator.spec.spec import Spec, load_spec
-from orchestrator.storage.rundir import describe
+from orchestrator.storage.claim import describe
 from orchestrator.work.plan import make_plan
 from orchestrator.work.progress import Silent
 from stitching.data.kitchen.demonstrations import KitchenDataConfig
 from sweeps.costs import plan_lines
-from sweeps.player import Played, SpecPlayer
+from sweeps.player import PlayedSpec, SpecPlayer
 from sweeps.search import search_spec
 from sweeps.space import Dimension
 from sweeps.spec import Confirm, Pruner, SweepSpec, load_sweep
@@ -36,7 +36,7 @@ def data_sweep(**changes: Any) -> SweepSpec:
     return replace(load_sweep("kitchen-data", "smoke"), **{"enqueued": (), **changes})
 
 
-def made_up(self: SpecPlayer, spec: Spec, seeds: Iterable[int] | None = None) -> Played:
+def made_up(self: SpecPlayer, spec: Spec, seeds: Iterable[int] | None = None) -> PlayedSpec:
     """Skills as the paper's tables imply them where quality is BEST, and further off elsewhere."""
     seeds = tuple(range(spec.seeds) if seeds is None else seeds)
     assert isinstance(spec.data, KitchenDataConfig)
@@ -57,7 +57,7 @@ def made_up(self: SpecPlayer, spec: Spec, seeds: Iterable[int] | None = None) ->
     columns = ["seed", "method", "prefix", "depth", "episode", "success", "end_step"]
     segments = pd.DataFrame(rows, columns=columns).drop_duplicates(columns[:5])
     run = replace(RunSpec.from_dict(describe(spec)), seeds=seeds)
-    return Played(segments, episodes_from_segments(segments, run), run)
+    return PlayedSpec(segments, episodes_from_segments(segments, run), run)
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.figures import frames, scenes
+from analysis.figures.showcase import frames, scenes
 from analysis.figures.showcase.frames import render_frames
 from analysis.figures.showcase.physics import (
     EQUAL_STEPS,

@@ -11,16 +11,16 @@ from orchestrator.spec.structure import Plain
 from stitching.bounds import Bounded
 from stitching.envs.protocol import Benchmark
 
-TEACHING = "every dataset that teaches"  # among an illustration's inputs
+TRAINING_DATA = "every dataset that skills are learned from"  # among an illustration's inputs
 
 
 @dataclass(frozen=True)
 class Dataset:
-    """One artifact of transitions; dynamics are learned from all, skills from those that teach."""
+    """One artifact of transitions: dynamics are learned from all, skills from some."""
 
     kind: str
     params: Plain = field(default_factory=dict)  # beside the data's settings and the root seed
-    teaches: bool = True
+    for_training: bool = True  # skills are learned from it
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Costs:
 
 
 @dataclass(frozen=True)
-class Kit:
+class BenchmarkEntry:
     """All that is to be known of a benchmark beside how it is stepped."""
 
     benchmark: Benchmark
@@ -70,7 +70,10 @@ def physics_illustrations(
     return {
         "showcase": Illustration(f"{family}-showcase", ("agent", "dynamics"), task),
         "diagnosis": Illustration(f"{family}-diagnosis", ("agent", "dynamics", "held-out")),
-        "anatomy": Illustration(
-            f"{family}-anatomy", ("agent", "dynamics", TEACHING), pairs=pairs, episodes=episodes
+        "stitches": Illustration(
+            f"{family}-stitches",
+            ("agent", "dynamics", TRAINING_DATA),
+            pairs=pairs,
+            episodes=episodes,
         ),
     }

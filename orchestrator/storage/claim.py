@@ -1,0 +1,104 @@
+"""What a run directory is made for: claimed once, and checked ever after."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Callable, Iterable
+
+from analysis.schema import SEPARATOR, SPEC
+from orchestrator.benchmarks.registry import ENTRIES
+from orchestrator.errors import ChangedError
+from orchestrator.spec.methods import first_method, method_label, method_of
+from orchestrator.spec.spec import Spec, TableSpec, differences, plain_spec, spec_from_plain
+from orchestrator.spec.structure import Plain, to_plain
+from orchestrator.storage.provenance import matters
+from orchestrator.storage.rundir import PLANNED, RunDirectory
+from orchestrator.work.plan import Plan, make_plan
+
+IDENTITY = "identity.json"
+
+
+def spec_of(directory: RunDirectory) -> Spec:
+    """The spec a directory was made for. UsageError where there is no run."""
+    return spec_from_plain(directory.asked()["spec"], str(directory.path / SPEC))
+
+
+def claim_for_spec(directory: RunDirectory, spec: Spec) -> str:
+    """Claim a directory for a spec, or check that it is the same one; returns the run's id.
+
+    Raises ChangedError naming what differs: a field, a package version, the code.
+    """
+    plan = make_plan(spec)
+    run_id = claim(directory, describe(spec), [plan], lambda: differences(spec_of(directory), spec))
+    directory.write_json(PLANNED, planned(plan))
+    return run_id
+
+
+def claim(
+    directory: RunDirectory,
+    description: Plain,
+    plans: Iterable[Plan],
+    differing: Callable[[], list[str]],
+) -> str:
+    """As `claim_for_spec`, for whatever is described; `differing` compares it with what is there.
+
+    Its scores depend on what these plans make and play.
+    """
+    now = matters(plans)
+    identity = directory.read_json(IDENTITY)
+    if identity is None:
+        identity = {"run_id": uuid.uuid4().hex, "matters": now}
+        directory.write_json(SPEC, description)
+        directory.write_json(IDENTITY, identity)
+        return str(identity["run_id"])
+    changed = differing()
+    before = identity["matters"]
+    changed += [
+        f"{name}: {before.get(name)} → {now[name]}"
+        for name in sorted(now)
+        if before.get(name) != now[name]
+    ]
+    if changed:
+        raise ChangedError(
+            f"{directory.path} was made under something else; choose another --out (finished "
+            "artifacts and blocks are shared), or go back to:\n  " + "\n  ".join(changed)
+        )
+    return str(identity["run_id"])
+
+
+def planned(plan: Plan) -> Plain:
+    """What `skillstitch status` counts, which should not have to plan for it."""
+    artifacts = [[recipe.kind, key] for key, recipe in plan.recipes.items()]
+    return {"artifacts": artifacts, "blocks": len(plan.tasks)}
+
+
+def describe(spec: Spec) -> Plain:
+    """The spec for readers of a run directory: resolved lists, and the spec itself."""
+    return {
+        "name": spec.name,
+        "title": spec.title,
+        "benchmark": spec.benchmark,
+        "scale": spec.scale,
+        "skills": spec.skill_names,
+        "methods": [
+            {
+                "name": method,
+                "label": method_label(method),
+                "own_first_skill": bool(first_method(method, spec.rollout)),
+                "models": list(method_of(method).models),
+            }
+            for method in spec.methods
+        ],
+        "seeds": list(range(spec.seeds)),
+        "episodes": spec.episodes,
+        "tasks": [SEPARATOR.join(task) for task in spec.all_tasks],
+        "step_limits": {str(length): limit for length, limit in spec.step_limits.items()},
+        "tables": [to_plain(table) | _title(spec, table) for table in spec.tables],
+        "spec": plain_spec(spec),
+    }
+
+
+def _title(spec: Spec, table: TableSpec) -> Plain:
+    """A table's title, which names its data where they are not the benchmark's usual ones."""
+    label = ENTRIES[spec.benchmark].label(spec.data)
+    return {"title": f"{table.title or spec.title} ({label})"} if label else {}
