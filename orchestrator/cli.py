@@ -16,6 +16,7 @@ from rich.console import Console
 
 from orchestrator.errors import SkillstitchError, UsageError, said_to_users
 from orchestrator.interruption import interrupted_by_sigterm
+from orchestrator.lazily import import_lazily
 from orchestrator.spec.tomls import packaged_specs
 from stitching.registry import PartError
 
@@ -74,6 +75,8 @@ def _usage() -> str:
 
 
 def _plan(words: list[str]) -> None:
+    tyro.cli(int, args=["0"])  # tyro looks for torch once; if it is there by then, tyro uses it
+    import_lazily("torch")
     from orchestrator.spec_commands import plan
 
     plan(words, OUTPUT)

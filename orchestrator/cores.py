@@ -7,6 +7,8 @@ import os
 import sys
 from pathlib import Path
 
+from orchestrator.errors import UsageError
+
 CGROUPS = Path("/sys/fs/cgroup")
 OWN_CGROUP = Path("/proc/self/cgroup")
 
@@ -38,3 +40,9 @@ def _limit(group: Path) -> float:
     except OSError:  # the topmost group has none
         return math.inf
     return math.inf if quota == "max" else int(quota) / int(period)
+
+
+def check_workers(workers: int | None) -> None:
+    """Raise UsageError for a number that nothing could have."""
+    if workers is not None and workers < 1:
+        raise UsageError(f"--workers must be at least 1: {workers}")

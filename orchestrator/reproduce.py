@@ -12,7 +12,7 @@ from analysis.episodes import write_episodes
 from analysis.report import build_report
 from analysis.schema import PROVENANCE, QUARANTINE
 from orchestrator import tracking
-from orchestrator.cores import usable_cores
+from orchestrator.cores import check_workers, usable_cores
 from orchestrator.errors import (
     BadDataError,
     IncompleteError,
@@ -39,12 +39,6 @@ from orchestrator.work.progress import Progress
 from orchestrator.work.stopwatch import Stopwatch
 
 MOST_ON_A_CORE = 8  # workers: each holds a copy of torch and of a simulator
-
-
-def check_workers(workers: int | None) -> None:
-    """Raise UsageError for a number that nothing could have."""
-    if workers is not None and workers < 1:
-        raise UsageError(f"--workers must be at least 1: {workers}")
 
 
 @dataclass(frozen=True)

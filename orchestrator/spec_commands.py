@@ -90,8 +90,8 @@ def _option(words: list[str], name: str) -> str:
 
 def plan(words: list[str], output: Console) -> None:
     """`skillstitch plan SPEC [options]`."""
+    from orchestrator.cores import check_workers
     from orchestrator.printing import forecast_lines, plan_lines, suite_plan_lines
-    from orchestrator.reproduce import check_workers
     from orchestrator.storage.ledger import Ledger
     from orchestrator.storage.store import Store
     from orchestrator.work.costs import estimate

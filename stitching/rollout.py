@@ -111,7 +111,6 @@ class _Progress:
             self.recorder.step(self.env, rows, self.episodes[rows], self.skill, phase)
 
 
-@torch.inference_mode()
 def play_segment(
     env: VectorEnv,
     agent: Agent,
@@ -132,24 +131,25 @@ def play_segment(
     rows = np.arange(len(block.episodes))
     if config.skill_limit:
         budget = np.minimum(budget, config.skill_limit)
-    progress = _Progress(env, skill, np.array(block.episodes), budget, recorder)
+    with torch.inference_mode():
+        progress = _Progress(env, skill, np.array(block.episodes), budget, recorder)
 
-    value = partial(_value, agent, config.stop_alpha, env)
-    value_start = value(rows, skill)
-    previous = names.index(block.prefix[-2]) if len(block.prefix) > 1 else None
-    if previous is not None or (config.first_stitch and stitcher.before_first):
-        _stitch(progress, stitcher, block, previous, value_start, value)
-    stitch_steps = progress.steps.copy()
-    value_end = value(rows, skill)
-    _execute(progress, agent, benchmark, config, block)
-    return Segments(
-        success=progress.success,
-        stitch_steps=stitch_steps,
-        steps=progress.steps,
-        value_start=value_start,
-        value_end=value_end,
-        snapshots=env.snapshot(rows),
-    )
+        value = partial(_value, agent, config.stop_alpha, env)
+        value_start = value(rows, skill)
+        previous = names.index(block.prefix[-2]) if len(block.prefix) > 1 else None
+        if previous is not None or (config.first_stitch and stitcher.before_first):
+            _stitch(progress, stitcher, block, previous, value_start, value)
+        stitch_steps = progress.steps.copy()
+        value_end = value(rows, skill)
+        _execute(progress, agent, benchmark, config, block)
+        return Segments(
+            success=progress.success,
+            stitch_steps=stitch_steps,
+            steps=progress.steps,
+            value_start=value_start,
+            value_end=value_end,
+            snapshots=env.snapshot(rows),
+        )
 
 
 def _stitch(

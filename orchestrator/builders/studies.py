@@ -1,6 +1,7 @@
 """What trained models are asked, and shown doing, for figures; no score depends on it.
 
-Apart from what makes data: an edit there would rename all that was learned from them.
+Apart from what makes data: an edit there would rename all that was learned from them. Studies are
+imported where they are made: what they import takes seconds, and plans have no use for it.
 """
 
 from __future__ import annotations
@@ -22,12 +23,9 @@ from stitching.methods.no_stitch import NO_STITCH
 from stitching.methods.protocol import Models, Stitcher
 from stitching.models.dynamics import Dynamics
 from stitching.rollout import RolloutConfig
-from stitching.studies.diagnosis import competence, prediction_errors, prices, value_progress
-from stitching.studies.forecast import pair_forecast
 from stitching.studies.showcase.maze import maze_showcase
 from stitching.studies.showcase.physics import physics_showcase
 from stitching.studies.showcase.shown import Shown
-from stitching.studies.stitches import StudiedMethod, study_stitches
 
 
 def _stitcher(method: str, settings: Plain, models: Models) -> Stitcher:
@@ -100,6 +98,14 @@ class Studies:
 
     def _diagnosis(self, params: Plain, inputs: Inputs) -> Artifact:
         """What `stitching.studies.diagnosis` says of the models, on the held-out data."""
+        from stitching.studies.diagnosis import (
+            competence,
+            prediction_errors,
+            prices,
+            value_progress,
+        )
+        from stitching.studies.forecast import pair_forecast
+
         benchmark = self.benchmarks[params["benchmark"]]
         models = load_models(benchmark, inputs)
         agent, dynamics = models.agent, models.one("dynamics", Dynamics)
@@ -120,6 +126,8 @@ class Studies:
 
     def _stitches(self, params: Plain, inputs: Inputs) -> Artifact:
         """Inputs beside the models are what the skills were learned from."""
+        from stitching.studies.stitches import StudiedMethod, study_stitches
+
         benchmark = self.benchmarks[params["benchmark"]]
         models = load_models(benchmark, inputs)
         ((method, settings),) = params["methods"]

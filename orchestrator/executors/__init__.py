@@ -6,17 +6,18 @@ import os
 from typing import Literal
 
 from orchestrator.executors.protocol import Executor
-from orchestrator.executors.serial import SerialExecutor
 
 ExecutorKind = Literal["ray", "serial"]
 
 
 def open_executor(kind: ExecutorKind, workers: int | None, address: str | None) -> Executor:
-    """Ray is imported only when asked for: that alone takes seconds.
+    """Each is imported only when asked for: Ray and torch take seconds.
 
     Raises UsageError when there is no cluster at `address`.
     """
     if kind == "serial":
+        from orchestrator.executors.serial import SerialExecutor
+
         return SerialExecutor()
     if address is None:
         # Ray decides at import whether its servers listen on all interfaces or on loopback alone.

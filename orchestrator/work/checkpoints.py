@@ -18,7 +18,6 @@ import numpy as np
 import torch
 from safetensors import SafetensorError
 from safetensors.torch import load, save
-from torch import Tensor
 
 from orchestrator.errors import StorageError
 from orchestrator.storage.store import write_atomically
@@ -70,7 +69,7 @@ class CheckpointFile:
     path: Path
     build: Checkpoints  # whose it is
 
-    def write(self, tensors: dict[str, Tensor], plain: dict[str, Any]) -> None:
+    def write(self, tensors: dict[str, torch.Tensor], plain: dict[str, Any]) -> None:
         """Replace the file whole; a disk that refuses costs the checkpoint alone."""
         kept = {"plain": plain, "seconds": self.build.spent}
         text = np.frombuffer(json.dumps(kept, default=np.ndarray.tolist).encode(), dtype=np.uint8)
@@ -79,7 +78,7 @@ class CheckpointFile:
         with suppress(OSError, StorageError):
             write_atomically(self.path, _digest(data) + data)
 
-    def read(self) -> tuple[dict[str, Tensor], dict[str, Any]] | None:
+    def read(self) -> tuple[dict[str, torch.Tensor], dict[str, Any]] | None:
         try:
             content = self.path.read_bytes()
         except OSError:

@@ -149,10 +149,10 @@ class _Code:
 
 @cache
 def _code(module: str) -> _Code:
-    spec = importlib.util.find_spec(module)
-    if spec is None or spec.origin is None:
+    file = _file_of(module)
+    if file is None:
         raise ModuleNotFoundError(module)
-    return _Code.of(Path(spec.origin))
+    return _Code.of(file)
 
 
 def _named_imports(tree: ast.Module) -> set[str]:
@@ -163,14 +163,18 @@ def _named_imports(tree: ast.Module) -> set[str]:
             named |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module is not None and not node.level:
             named |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
-    return {name for name in named if "." in name and _is_ours(name) and _is_module(name)}
+    return {name for name in named if "." in name and _is_ours(name) and _file_of(name)}
 
 
-def _is_module(name: str) -> bool:
-    try:
-        return importlib.util.find_spec(name) is not None
-    except ModuleNotFoundError:  # its parent is a module, and no package
-        return False
+@cache
+def _file_of(module: str) -> Path | None:
+    """The source of a module, without importing what is above it; None where there is none."""
+    package = importlib.util.find_spec(module.partition(".")[0])
+    if package is None or not package.submodule_search_locations:
+        return None
+    path = Path(package.submodule_search_locations[0]).joinpath(*module.split(".")[1:])
+    candidates = (path.with_name(f"{path.name}.py"), path / "__init__.py")
+    return next((file for file in candidates if file.is_file()), None)
 
 
 def _syntax(tree: ast.Module) -> str:

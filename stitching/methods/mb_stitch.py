@@ -8,7 +8,7 @@ from functools import cached_property, partial
 from typing import ClassVar
 
 import numpy as np
-from torch import Tensor
+import torch
 
 from stitching.bounds import Amount, Few, NotNegative
 from stitching.methods.planning import PlanningSettings
@@ -61,7 +61,7 @@ class MBStitch:
 
     def propose(
         self,
-        states: Tensor,
+        states: torch.Tensor,
         previous: int | None,
         following: int,
         streams: Sequence[np.random.Generator],
@@ -69,28 +69,30 @@ class MBStitch:
         return self.proposal(self.plan(states, following, streams), states, following)
 
     def plan(
-        self, states: Tensor, following: int, streams: Sequence[np.random.Generator]
+        self, states: torch.Tensor, following: int, streams: Sequence[np.random.Generator]
     ) -> PlannedActions:
         """The plan from each of the states (n, observation) that promises most by Eq. 2."""
         score = self.score(states, following)
         return self.settings.chosen.plan(score, streams, self.models.actions)
 
-    def proposal(self, plan: PlannedActions, states: Tensor, following: int) -> Proposal:
+    def proposal(self, plan: PlannedActions, states: torch.Tensor, following: int) -> Proposal:
         """What is carried out of the plan, and from which of the states."""
         actions = plan.actions[:, : self.settings.execute].numpy()
         if not self.settings.selective:
             return Proposal.of(actions)
         return Proposal(actions, (plan.objective > self.present(states, following)).numpy())
 
-    def present(self, states: Tensor, following: int) -> Tensor:
+    def present(self, states: torch.Tensor, following: int) -> torch.Tensor:
         """Eq. 2 of states themselves, (n, observation) → (n,): nothing there is predicted."""
         return self._equation_2(self._critic.values(states, following), states[None])
 
-    def score(self, states: Tensor, following: int) -> Score:
+    def score(self, states: torch.Tensor, following: int) -> Score:
         """Eq. 2 of each imagined action sequence, every member on its own path."""
         return imagined(states, self.models.actions, partial(self._imagine, following=following))
 
-    def _imagine(self, starts: Tensor, sequences: Tensor, following: int) -> Tensor:
+    def _imagine(
+        self, starts: torch.Tensor, sequences: torch.Tensor, following: int
+    ) -> torch.Tensor:
         """Eq. 2 of sequences, (n, observation), (n, horizon, action) → (n,).
 
         The value is always that of the last state.
@@ -103,11 +105,11 @@ class MBStitch:
         # The value is the same at every step's price, so the mean is over prices alone.
         return self._equation_2(values, self.dynamics.scaled(path)).mean(dim=0)
 
-    def _values(self, predicted: Tensor, following: int) -> Tensor:
+    def _values(self, predicted: torch.Tensor, following: int) -> torch.Tensor:
         """By each value member at the mean predicted state: (D, n, observation) → (M, n)."""
         return self._critic.values(predicted.mean(dim=0), following)
 
-    def _equation_2(self, values: Tensor, predicted: Tensor) -> Tensor:
+    def _equation_2(self, values: torch.Tensor, predicted: torch.Tensor) -> torch.Tensor:
         """Of values (M, n) and scaled predictions (D, ..., n, observation), under the settings."""
         one = self.settings
         return conservative_value(values, predicted, one.alpha, one.beta, one.norm)

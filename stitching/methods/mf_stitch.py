@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from torch import Tensor
+import torch
 
 from stitching.bounds import Amount
 from stitching.data.mixtures import Mixture, skill_pairs
@@ -69,7 +69,7 @@ class MFStitch:
 
     def propose(
         self,
-        states: Tensor,
+        states: torch.Tensor,
         previous: int | None,
         following: int,
         streams: Sequence[np.random.Generator],

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
-from torch import Tensor
+import torch
 
 from stitching.bounds import Bounded
 from stitching.envs.protocol import ActionSpace, Benchmark
@@ -75,7 +75,7 @@ class Stitcher(Protocol):
 
     def propose(
         self,
-        states: Tensor,
+        states: torch.Tensor,
         previous: int | None,
         following: int,
         streams: Sequence[np.random.Generator],

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from torch import Tensor
+import torch
 
 from stitching.bounds import Amount
 from stitching.methods.protocol import Method, MethodSettings, Models, Proposal
@@ -35,7 +35,7 @@ class RandomStitch:
 
     def propose(
         self,
-        states: Tensor,
+        states: torch.Tensor,
         previous: int | None,
         following: int,
         streams: Sequence[np.random.Generator],

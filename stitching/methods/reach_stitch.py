@@ -8,7 +8,7 @@ from functools import cached_property, partial
 from typing import ClassVar
 
 import numpy as np
-from torch import Tensor
+import torch
 
 from stitching.bounds import Amount, Few, NotNegative
 from stitching.methods.planning import PlanningSettings
@@ -62,7 +62,7 @@ class ReachStitch:
 
     def propose(
         self,
-        states: Tensor,
+        states: torch.Tensor,
         previous: int | None,
         following: int,
         streams: Sequence[np.random.Generator],
@@ -78,7 +78,9 @@ class ReachStitch:
             actions[rows] = plan.actions[:, :execute].numpy()
         return Proposal(actions, outside.numpy())
 
-    def _imagine(self, starts: Tensor, sequences: Tensor, following: int) -> Tensor:
+    def _imagine(
+        self, starts: torch.Tensor, sequences: torch.Tensor, following: int
+    ) -> torch.Tensor:
         """The objective of sequences, (n, observation), (n, horizon, action) → (n,)."""
         path = self._dynamics.imagine_path(starts, sequences)  # (D, horizon, n, observation)
         nearness = -self._initiation.distances(path, following).mean(dim=0)  # (horizon, n)

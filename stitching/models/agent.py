@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from torch import Tensor
 
 from stitching.envs.protocol import ActionSpace
 from stitching.models.layers import Params, Precision, at_precision, mlp, named, parameters
@@ -19,12 +18,12 @@ from stitching.models.losses import LOG_STD_RANGE
 class Networks:
     """What was learned together: of all skills, or of one."""
 
-    mean: Tensor  # (observation,)
-    std: Tensor
-    low: Tensor  # (observation,) what is seen is held to this range; infinite without `clip`
-    high: Tensor
+    mean: torch.Tensor  # (observation,)
+    std: torch.Tensor
+    low: torch.Tensor  # (observation,) what is seen is held to this range; infinite without `clip`
+    high: torch.Tensor
     policy: Params
-    log_std: Tensor  # (action,)
+    log_std: torch.Tensor  # (action,)
     v: Params
 
     @classmethod
@@ -68,19 +67,19 @@ class Agent:
         other._networks = [replace(one, v=at_precision(one.v, precision)) for one in self._networks]
         return other
 
-    def _inputs(self, states: Tensor, condition: int) -> Tensor:
+    def _inputs(self, states: torch.Tensor, condition: int) -> torch.Tensor:
         own, conditions = self._networks[condition], self._conditions[condition]
         scaled = (states.clamp(own.low, own.high) - own.mean) / own.std
         return torch.cat([scaled, conditions.expand(len(states), -1)], dim=-1)
 
-    def values(self, states: Tensor, condition: int) -> Tensor:
+    def values(self, states: torch.Tensor, condition: int) -> torch.Tensor:
         """V of each member: (n, observation) → (M, n)."""
         v = self._networks[condition].v
         return mlp(v, self._inputs(states, condition)).squeeze(-1)
 
     def act(
         self,
-        states: Tensor,
+        states: torch.Tensor,
         condition: int,
         noise: np.ndarray | None,
         temperature: float = 1.0,
@@ -101,7 +100,9 @@ class Agent:
             mean = mean + temperature * torch.from_numpy(noise) * own.log_std.exp()
         return mean.clamp(-1, 1).numpy()
 
-    def _categorical(self, logits: Tensor, noise: np.ndarray | None, temperature: float) -> Tensor:
+    def _categorical(
+        self, logits: torch.Tensor, noise: np.ndarray | None, temperature: float
+    ) -> torch.Tensor:
         if noise is None:
             choice = logits.argmax(dim=-1)
         else:

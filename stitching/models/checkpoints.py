@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any, Protocol
 
-from torch import Tensor
+import torch
 
 from stitching.streams import Label
 
@@ -18,10 +18,10 @@ from stitching.streams import Label
 class Checkpoint(Protocol):
     """What one training has kept: tensors by name, and what is plain, as JSON has it."""
 
-    def write(self, tensors: dict[str, Tensor], plain: dict[str, Any]) -> None:
+    def write(self, tensors: dict[str, torch.Tensor], plain: dict[str, Any]) -> None:
         """Replace what was kept; arrays in `plain` may come back as lists."""
 
-    def read(self) -> tuple[dict[str, Tensor], dict[str, Any]] | None:
+    def read(self) -> tuple[dict[str, torch.Tensor], dict[str, Any]] | None:
         """What was written last; None where there is nothing, or nothing whole."""
 
 

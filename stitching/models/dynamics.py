@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from torch import Tensor
 
 from stitching.bounds import Amount, Bounded, Count, Few, LearningRate, Width
 from stitching.data.transitions import Transitions
@@ -51,15 +50,15 @@ class Dynamics:
         self._activation = config.activation
         self.precision = config.precision
 
-    def scaled(self, states: Tensor) -> Tensor:
+    def scaled(self, states: torch.Tensor) -> torch.Tensor:
         """States in units of the data's standard deviation, per dimension."""
         return states / self._std
 
-    def __call__(self, states: Tensor, actions: Tensor) -> Tensor:
+    def __call__(self, states: torch.Tensor, actions: torch.Tensor) -> torch.Tensor:
         """Next states: (D or 1, n, observation), (n, action) → (D, n, observation)."""
         return states + self._change((states - self._mean) / self._std, actions) * self._std
 
-    def imagine(self, states: Tensor, sequences: Tensor) -> Tensor:
+    def imagine(self, states: torch.Tensor, sequences: torch.Tensor) -> torch.Tensor:
         """States after whole sequences: (n, observation), (n, horizon, action) → (D, n, …).
 
         The same as one step after another, but normalised once.
@@ -67,19 +66,21 @@ class Dynamics:
         *_, last = self._scaled_steps(states, sequences)
         return last * self._std + self._mean
 
-    def imagine_path(self, states: Tensor, sequences: Tensor) -> Tensor:
+    def imagine_path(self, states: torch.Tensor, sequences: torch.Tensor) -> torch.Tensor:
         """States after each step: (n, observation), (n, horizon, action) → (D, horizon, n, …)."""
         steps = torch.stack(list(self._scaled_steps(states, sequences)), dim=1)
         return steps * self._std + self._mean
 
-    def _scaled_steps(self, states: Tensor, sequences: Tensor) -> Iterator[Tensor]:
+    def _scaled_steps(
+        self, states: torch.Tensor, sequences: torch.Tensor
+    ) -> Iterator[torch.Tensor]:
         """The members' states after each step, in units of their scale: (D, n, observation)."""
         scaled = ((states - self._mean) / self._std).unsqueeze(0)
         for actions in sequences.unbind(dim=1):
             scaled = scaled + self._change(scaled, actions)
             yield scaled
 
-    def _change(self, scaled: Tensor, actions: Tensor) -> Tensor:
+    def _change(self, scaled: torch.Tensor, actions: torch.Tensor) -> torch.Tensor:
         """Change of state in units of its scale: (D or 1, n, observation) → (D, n, observation)."""
         inputs = torch.cat([scaled, actions.expand(len(scaled), -1, -1)], dim=-1)
         members = self._params["w0"].shape[0]

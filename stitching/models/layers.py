@@ -5,21 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import numpy as np
 import torch
-from torch import Tensor
-from torch.nn import functional as F
 
-Params = dict[str, Tensor]
+Params: TypeAlias = "dict[str, torch.Tensor]"
 Precision = Literal["float32", "bfloat16"]
 Activation = Literal["relu", "elu", "sigmoid"]
 
-ACTIVATIONS: dict[Activation, Callable[[Tensor], Tensor]] = {
-    "relu": F.relu,
-    "elu": F.elu,
-    "sigmoid": torch.sigmoid,
+ACTIVATIONS: dict[Activation, Callable[[torch.Tensor], torch.Tensor]] = {
+    "relu": lambda x: torch.relu(x),
+    "elu": lambda x: torch.nn.functional.elu(x),
+    "sigmoid": lambda x: torch.sigmoid(x),
 }
 
 
@@ -40,11 +38,11 @@ def init_mlp(members: int, sizes: Sequence[int], rng: np.random.Generator) -> Pa
 
 def mlp(
     params: Params,
-    inputs: Tensor,
+    inputs: torch.Tensor,
     activation: Activation = "relu",
     dropout: float = 0.0,
     generator: torch.Generator | None = None,
-) -> Tensor:
+) -> torch.Tensor:
     """All members on their inputs: (members, n, in) → (members, n, out), float32.
 
     Inputs of shape (n, in) are shown to every member. Dropout follows each hidden activation and

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import torch
-from torch import Tensor
 
 from stitching.models.layers import Params, at_precision, mlp
 
@@ -22,24 +21,26 @@ MAX_ADVANTAGE_WEIGHT = 100.0  # as in the authors' implementation
 class Batch:
     """One minibatch of B transitions; inputs are normalised observations next to conditions."""
 
-    inputs: Tensor  # (B, observation + condition)
-    actions: Tensor  # (B, action)
-    next_inputs: Tensor  # (B, observation + condition)
-    rewards: Tensor  # (B,)
-    continues: Tensor  # (B,) 0 where terminal, else 1
+    inputs: torch.Tensor  # (B, observation + condition)
+    actions: torch.Tensor  # (B, action)
+    next_inputs: torch.Tensor  # (B, observation + condition)
+    rewards: torch.Tensor  # (B,)
+    continues: torch.Tensor  # (B,) 0 where terminal, else 1
 
 
-def expectile_loss(difference: Tensor, expectile: float) -> Tensor:
+def expectile_loss(difference: torch.Tensor, expectile: float) -> torch.Tensor:
     """Eq. 5 of IQL: the asymmetric square |expectile − 1(u < 0)| u², elementwise."""
     return torch.where(difference < 0, 1 - expectile, expectile) * difference.square()
 
 
-def twin_minimum(q: Tensor) -> Tensor:
+def twin_minimum(q: torch.Tensor) -> torch.Tensor:
     """The smaller of each member's two Q-functions: (2M, B, 1) → (M, B)."""
     return q.squeeze(-1).unflatten(0, (-1, 2)).amin(dim=1)
 
 
-def log_probability(outputs: Tensor, log_std: Tensor, actions: Tensor, discrete: bool) -> Tensor:
+def log_probability(
+    outputs: torch.Tensor, log_std: torch.Tensor, actions: torch.Tensor, discrete: bool
+) -> torch.Tensor:
     """log π(a|s): categorical over one-hot actions, or Gaussian around tanh(outputs). (B,)"""
     if discrete:
         return (outputs.log_softmax(-1) * actions).sum(-1)
@@ -48,17 +49,19 @@ def log_probability(outputs: Tensor, log_std: Tensor, actions: Tensor, discrete:
     return (-0.5 * scaled.square() - log_std - 0.5 * math.log(2 * math.pi)).sum(-1)
 
 
-def value_loss(target_q: Tensor, v: Tensor, expectile: float) -> Tensor:
+def value_loss(target_q: torch.Tensor, v: torch.Tensor, expectile: float) -> torch.Tensor:
     """Eq. 5: V(s) towards an upper expectile of the target networks' Q(s, a); both (M, B)."""
     return expectile_loss(target_q - v, expectile).mean()
 
 
-def q_loss(q: Tensor, backup: Tensor) -> Tensor:
+def q_loss(q: torch.Tensor, backup: torch.Tensor) -> torch.Tensor:
     """Eq. 6: Q(s, a) towards r + γ V(s'); (M, 2, B) and (M, B)."""
     return (q - backup.unsqueeze(1)).square().mean()
 
 
-def policy_loss(advantage: Tensor, log_prob: Tensor, temperature: float) -> Tensor:
+def policy_loss(
+    advantage: torch.Tensor, log_prob: torch.Tensor, temperature: float
+) -> torch.Tensor:
     """Eq. 7: imitation, weighted by exp(β A(s, a)); both (B,)."""
     weight = (temperature * advantage).exp().clamp(max=MAX_ADVANTAGE_WEIGHT)
     return -(weight * log_prob).mean()
@@ -69,12 +72,12 @@ def iql_losses(
     q_target: Params,
     v: Params,
     policy: Params,
-    log_std: Tensor,
+    log_std: torch.Tensor,
     batch: Batch,
     config: IQLConfig,
     discrete: bool,
     generator: torch.Generator,
-) -> dict[str, Tensor]:
+) -> dict[str, torch.Tensor]:
     """All three, each averaged over batch and members, and what is watched beside them.
 
     q_target are the slow copies of q. The policy is extracted with the members' mean advantage.

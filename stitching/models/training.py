@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import torch
-from torch import Tensor
 
 from stitching.models.checkpoints import Checkpoint, checkpoint_of
 from stitching.streams import Label
@@ -41,7 +40,7 @@ class CurveLog:
     every: int
     curves: Curves = field(default_factory=dict)
 
-    def record(self, update: int, values: dict[str, Tensor]) -> None:
+    def record(self, update: int, values: dict[str, torch.Tensor]) -> None:
         done = update + 1
         if done % self.every and done != self.updates:
             return
@@ -61,7 +60,7 @@ class Training:
     """All that changes from one update to the next: what a checkpoint keeps."""
 
     labels: tuple[Label, ...]  # tell trainings of one artifact apart
-    tensors: dict[str, Tensor]  # what the updates change in place
+    tensors: dict[str, torch.Tensor]  # what the updates change in place
     optimizer: torch.optim.Optimizer
     batches: np.random.Generator
     log: CurveLog
@@ -103,7 +102,7 @@ class Training:
         if found is None:
             return 0
         tensors, plain = found
-        states: dict[int, dict[str, Tensor]] = {}
+        states: dict[int, dict[str, torch.Tensor]] = {}
         for name, value in tensors.items():
             if name.startswith("optimizer."):
                 _, number, kind = name.split(".")

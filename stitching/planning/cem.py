@@ -1,11 +1,12 @@
 """The cross-entropy method: the planner of Kitchen and Robosuite (appendix B.2, Table 7)."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import torch
-from torch import Tensor
 
 from stitching.bounds import (
     Bounded,
@@ -72,36 +73,38 @@ class CEM(Bounded):
     def can_search(self, actions: ActionSpace) -> bool:
         return not actions.discrete  # it samples Gaussians
 
-    @torch.no_grad()
     def plan(
         self, score: Score, streams: Sequence[np.random.Generator], actions: ActionSpace
     ) -> PlannedActions:
         if not self.can_search(actions):
             raise ValueError("CEM samples Gaussians: use RandomShooting for discrete actions")
-        problems = torch.arange(len(streams))
-        mean = torch.zeros(len(streams), self.horizon, actions.size)
-        std = torch.ones_like(mean)
-        iterations = torch.zeros_like(problems)
+        with torch.no_grad():
+            problems = torch.arange(len(streams))
+            mean = torch.zeros(len(streams), self.horizon, actions.size)
+            std = torch.ones_like(mean)
+            iterations = torch.zeros_like(problems)
 
-        still_open = problems
-        for t in range(self.iterations):
-            if len(still_open) == 0:
-                break
-            noise = self._noise([streams[problem] for problem in still_open.tolist()], actions.size)
-            mean_t, std_t = mean[still_open], std[still_open]
-            samples = (mean_t[:, None] + std_t[:, None] * noise).clamp(-1, 1)
-            scores = sortable(score(still_open, samples), still_open)
-            elite_mean, elite_std = self._fit(samples, scores, t)
-            mean[still_open] = self.momentum * mean_t + (1 - self.momentum) * elite_mean
-            std[still_open] = self.momentum * std_t + (1 - self.momentum) * elite_std
-            iterations[still_open] += 1
-            still_open = still_open[std[still_open].amax(dim=(1, 2)) >= self.tolerance]
+            still_open = problems
+            for t in range(self.iterations):
+                if len(still_open) == 0:
+                    break
+                noise = self._noise(
+                    [streams[problem] for problem in still_open.tolist()], actions.size
+                )
+                mean_t, std_t = mean[still_open], std[still_open]
+                samples = (mean_t[:, None] + std_t[:, None] * noise).clamp(-1, 1)
+                scores = sortable(score(still_open, samples), still_open)
+                elite_mean, elite_std = self._fit(samples, scores, t)
+                mean[still_open] = self.momentum * mean_t + (1 - self.momentum) * elite_mean
+                std[still_open] = self.momentum * std_t + (1 - self.momentum) * elite_std
+                iterations[still_open] += 1
+                still_open = still_open[std[still_open].amax(dim=(1, 2)) >= self.tolerance]
 
-        mean.clamp_(-1, 1)  # the average of actions at the bound may be rounded past it
-        objective = sortable(score(problems, mean[:, None]), problems)[:, 0]
-        return PlannedActions(mean, objective, iterations)
+            mean.clamp_(-1, 1)  # the average of actions at the bound may be rounded past it
+            objective = sortable(score(problems, mean[:, None]), problems)[:, 0]
+            return PlannedActions(mean, objective, iterations)
 
-    def _noise(self, streams: Sequence[np.random.Generator], size: int) -> Tensor:
+    def _noise(self, streams: Sequence[np.random.Generator], size: int) -> torch.Tensor:
         """(problems, population, horizon, action) from N(0, 1), row by row from its own stream."""
         shape = (len(streams), self.population, self.horizon, size)
         noise = np.empty(shape, dtype=np.float32)
@@ -109,7 +112,9 @@ class CEM(Bounded):
             stream.standard_normal(out=row, dtype=np.float32)
         return torch.from_numpy(noise)
 
-    def _fit(self, samples: Tensor, scores: Tensor, t: int) -> tuple[Tensor, Tensor]:
+    def _fit(
+        self, samples: torch.Tensor, scores: torch.Tensor, t: int
+    ) -> tuple[torch.Tensor, torch.Tensor]:
         """Weighted mean and standard deviation of the elites, each (problems, horizon, action)."""
         # At zero the softmax would be 0 / 0; its limit there is the best elite alone.
         tau = max(self.temperature * self.temperature_discount**t, torch.finfo(torch.float32).tiny)

@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypeAlias
 
 import torch
-from torch import Tensor
 
 from stitching.envs.protocol import ActionSpace
 from stitching.planning.protocol import Score
 
-Judge = Callable[[Tensor, Tensor], Tensor]
+Judge: TypeAlias = "Callable[[torch.Tensor, torch.Tensor], torch.Tensor]"
 """judge(starts, sequences) -> scores: (n, observation), (n, horizon, action) → (n,)."""
 
 
-def imagined(states: Tensor, actions: ActionSpace, judge: Judge) -> Score:
+def imagined(states: torch.Tensor, actions: ActionSpace, judge: Judge) -> Score:
     """What planners ask for: the judgement of each sequence from its problem's state.
 
     states: (problems, observation).
     """
 
-    def score(problems: Tensor, sampled: Tensor) -> Tensor:
+    def score(problems: torch.Tensor, sampled: torch.Tensor) -> torch.Tensor:
         population = sampled.shape[1]
         starts = states[problems].repeat_interleave(population, dim=0)
         sequences = sampled.flatten(0, 1)  # (problems · population, horizon, action)
@@ -33,7 +33,9 @@ def imagined(states: Tensor, actions: ActionSpace, judge: Judge) -> Score:
     return score
 
 
-def distinct(starts: Tensor, sequences: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+def distinct(
+    starts: torch.Tensor, sequences: torch.Tensor
+) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     """Distinct pairs of start and sequence, and where each of the n given pairs went, (n,)."""
     pairs = torch.cat([starts, sequences.flatten(1)], dim=1)
     unique, inverse = pairs.unique(dim=0, return_inverse=True)

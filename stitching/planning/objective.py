@@ -1,17 +1,18 @@
 """Equation 2: the conservative value of a predicted state, which every plan maximises."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Literal
 
 import torch
-from torch import Tensor
 
 Norm = Literal["mean", "l2", "max"]
 Price = Literal["end", "path"]  # what a plan's Var(T) is: its last state's, or its steps' mean
 
 # The paper writes Var(T) of a vector-valued T as a scalar without saying how. "mean" lets β
 # keep its meaning whatever the size of the observation.
-NORMS: dict[Norm, Callable[[Tensor], Tensor]] = {
+NORMS: dict[Norm, Callable[[torch.Tensor], torch.Tensor]] = {
     "mean": lambda spread: spread.mean(dim=-1),
     "l2": lambda spread: torch.linalg.vector_norm(spread, dim=-1),
     "max": lambda spread: spread.amax(dim=-1),
@@ -19,8 +20,8 @@ NORMS: dict[Norm, Callable[[Tensor], Tensor]] = {
 
 
 def conservative_value(
-    values: Tensor, next_states: Tensor, alpha: float, beta: float, norm: Norm = "mean"
-) -> Tensor:
+    values: torch.Tensor, next_states: torch.Tensor, alpha: float, beta: float, norm: Norm = "mean"
+) -> torch.Tensor:
     """v_ensemble(s') = E[v(s')] − α·Var(v(s')) − β·Var(T(s'|s, a))   (Eq. 2).
 
     As in the paper, E is the mean over the members of an ensemble and "Var" their standard
@@ -41,7 +42,7 @@ def conservative_value(
     return values.mean(dim=0) - alpha * spread_over_members(values) - beta * state_spread
 
 
-def spread_over_members(predictions: Tensor) -> Tensor:
+def spread_over_members(predictions: torch.Tensor) -> torch.Tensor:
     """Population standard deviation over the first dimension: (members, ...) → (...)."""
     # Tensor.std is not vectorised over the first dimension: some 30 times slower on a CPU.
     return (predictions - predictions.mean(dim=0)).square().mean(dim=0).sqrt()

@@ -4,16 +4,18 @@ A *problem* is one episode that is waiting for a plan. All problems of a block a
 together, so scores are a few large tensor operations.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 import numpy as np
-from torch import Tensor
+import torch
 
 from stitching.envs.protocol import ActionSpace
 
-Score = Callable[[Tensor, Tensor], Tensor]
+Score: TypeAlias = "Callable[[torch.Tensor, torch.Tensor], torch.Tensor]"
 """score(problems, actions) -> scores, to be maximised.
 
 problems: (open,) int64, indices into `streams` of the problems that are still being planned.
@@ -26,9 +28,9 @@ scores:   (open, population) float32, on the CPU.
 class PlannedActions:
     """The outcome of planning, one row a problem."""
 
-    actions: Tensor  # (problems, horizon, action) float32: what to execute
-    objective: Tensor  # (problems,) float32: the score of `actions`
-    iterations: Tensor  # (problems,) int64: populations sampled
+    actions: torch.Tensor  # (problems, horizon, action) float32: what to execute
+    objective: torch.Tensor  # (problems,) float32: the score of `actions`
+    iterations: torch.Tensor  # (problems,) int64: populations sampled
 
 
 class Planner(Protocol):

@@ -1,11 +1,12 @@
 """Random shooting: the planner of MazeRunner (appendix B.2)."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import torch
-from torch import Tensor
 
 from stitching.bounds import Bounded, Count, Few
 from stitching.envs.protocol import ActionSpace
@@ -27,19 +28,19 @@ class RandomShooting(Bounded):
     def can_search(self, actions: ActionSpace) -> bool:
         return True
 
-    @torch.no_grad()
     def plan(
         self, score: Score, streams: Sequence[np.random.Generator], actions: ActionSpace
     ) -> PlannedActions:
-        problems = torch.arange(len(streams))
-        sequences = self._draw(streams, actions)
-        scores = sortable(score(problems, sequences), problems)
-        best = scores.argmax(dim=1)
-        return PlannedActions(
-            sequences[problems, best], scores[problems, best], torch.ones_like(problems)
-        )
+        with torch.no_grad():
+            problems = torch.arange(len(streams))
+            sequences = self._draw(streams, actions)
+            scores = sortable(score(problems, sequences), problems)
+            best = scores.argmax(dim=1)
+            return PlannedActions(
+                sequences[problems, best], scores[problems, best], torch.ones_like(problems)
+            )
 
-    def _draw(self, streams: Sequence[np.random.Generator], actions: ActionSpace) -> Tensor:
+    def _draw(self, streams: Sequence[np.random.Generator], actions: ActionSpace) -> torch.Tensor:
         """(problems, population, horizon, action), row by row from its own stream."""
         shape = (self.population, self.horizon)
         # np.stack would refuse an empty list: there may be no problem to plan for.

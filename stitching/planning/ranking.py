@@ -1,10 +1,11 @@
 """Scores that can be ranked: what planners do about NaN and infinity."""
 
+from __future__ import annotations
+
 import torch
-from torch import Tensor
 
 
-def sortable(scores: Tensor, problems: Tensor) -> Tensor:
+def sortable(scores: torch.Tensor, problems: torch.Tensor) -> torch.Tensor:
     """Scores with everything that is not finite at −∞, so that it loses to all that is.
 
     A learned model driven far outside its data may overflow. +∞ comes from that, not from a good

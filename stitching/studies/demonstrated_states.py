@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from torch import Tensor
 
 from stitching.data.transitions import Transitions
 from stitching.models.dynamics import Dynamics
@@ -22,8 +21,8 @@ class DemonstratedStates:
     the square root of their number: 1 is one standard deviation in every dimension.
     """
 
-    states: Tensor  # (N, observation), in those units
-    demonstrations: Tensor  # (N,) int64, which of them each state is of
+    states: torch.Tensor  # (N, observation), in those units
+    demonstrations: torch.Tensor  # (N,) int64, which of them each state is of
 
     @classmethod
     def of(cls, data: Transitions, skill: int, dynamics: Dynamics) -> DemonstratedStates:
@@ -33,7 +32,7 @@ class DemonstratedStates:
         states = dynamics.scaled(torch.from_numpy(data.observations[chosen]))
         return cls(states, torch.from_numpy(numbers))
 
-    def distances(self, states: Tensor) -> Tensor:
+    def distances(self, states: torch.Tensor) -> torch.Tensor:
         """To the nearest demonstrated state: (n, observation), in the data's units → (n,)."""
         return self._gaps(states).amin(dim=1)
 
@@ -50,7 +49,7 @@ class DemonstratedStates:
         gaps = self._gaps(self.states[shown]).masked_fill(same, torch.inf)
         return float(gaps.amin(dim=1).median())
 
-    def _gaps(self, states: Tensor) -> Tensor:
+    def _gaps(self, states: torch.Tensor) -> torch.Tensor:
         """(n, observation) → (n, N). Without the matrix product, which is inexact near zero."""
         exact = "donot_use_mm_for_euclid_dist"
         return torch.cdist(states, self.states, compute_mode=exact) / states.shape[1] ** 0.5

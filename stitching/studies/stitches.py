@@ -15,7 +15,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 import torch
-from torch import Tensor
 
 from stitching.data.transitions import Transitions
 from stitching.envs.protocol import Benchmark, VectorEnv
@@ -63,7 +62,7 @@ class StudiedMethod:
             self._env, self.agent, stitcher, self.benchmark, self.rollout, block, budget, recorder
         )
 
-    def boundary(self, block: Block, snapshots: np.ndarray | None) -> Tensor:
+    def boundary(self, block: Block, snapshots: np.ndarray | None) -> torch.Tensor:
         """What such a segment begins with: (n, observation)."""
         begin(self._env, block, snapshots)
         return torch.from_numpy(self._env.observe(np.arange(len(block.episodes))))
@@ -114,7 +113,7 @@ class StitchRecorder:
 
     def propose(
         self,
-        states: Tensor,
+        states: torch.Tensor,
         previous: int | None,
         following: int,
         streams: Sequence[np.random.Generator],
@@ -125,7 +124,7 @@ class StitchRecorder:
         self._expected = list(compress(expected, proposal.wanted))
         return proposal
 
-    def foresee(self, states: Tensor, following: int, plan: PlannedActions) -> list[Numbers]:
+    def foresee(self, states: torch.Tensor, following: int, plan: PlannedActions) -> list[Numbers]:
         """The three terms of Eq. 2 one action ahead, unweighted, and Eq. 2 at the plan's end.
 
         For each of the states (n, observation): "value" E[v(s')], "spread" Var(v(s')) and
@@ -146,7 +145,7 @@ class StitchRecorder:
             for row in range(len(states))
         ]
 
-    def look(self, states: Tensor, episodes: Sequence[int], skill: int) -> None:
+    def look(self, states: torch.Tensor, episodes: Sequence[int], skill: int) -> None:
         """Write down real states (n, observation) of these episodes."""
         values = self._agent.values(states, skill)
         distances = self._near.distances(self._stitcher.dynamics.scaled(states))

@@ -7,7 +7,6 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import torch
-from torch import Tensor
 
 from stitching.envs.protocol import ActionSpace
 from stitching.planning.protocol import Planner, Score
@@ -20,13 +19,13 @@ def streams(problems: int = PROBLEMS) -> list[np.random.Generator]:
     return [np.random.Generator(np.random.Philox(key=problem)) for problem in range(problems)]
 
 
-def exact_bowls(problems: Tensor, actions: Tensor) -> Tensor:
+def exact_bowls(problems: torch.Tensor, actions: torch.Tensor) -> torch.Tensor:
     """Bowls at different places, in small integers: exact in float32 in any order of summation."""
     target = 10 * (problems[:, None, None, None] - 2)
     return -((actions * 64).round() - target).square().sum(dim=(2, 3)) / 4096
 
 
-def only(score: Score, chosen: Tensor) -> Score:
+def only(score: Score, chosen: torch.Tensor) -> Score:
     """The same score for a planner that sees the chosen problems alone."""
     return lambda problems, actions: score(chosen[problems], actions)
 
@@ -43,7 +42,7 @@ class PlannerConformance:
         assert (plan.iterations >= 1).all()
 
     def test_what_the_score_is_given(self, planner: Planner, space: ActionSpace) -> None:
-        def score(problems: Tensor, actions: Tensor) -> Tensor:
+        def score(problems: torch.Tensor, actions: torch.Tensor) -> torch.Tensor:
             assert problems.dtype == torch.int64
             assert actions.dtype == torch.float32
             assert actions.shape[0] == len(problems)
@@ -115,7 +114,7 @@ class PlannerConformance:
         assert not plan.objective.requires_grad
 
     def test_scores_that_are_nan_lose(self, planner: Planner, space: ActionSpace) -> None:
-        def score(problems: Tensor, actions: Tensor) -> Tensor:
+        def score(problems: torch.Tensor, actions: torch.Tensor) -> torch.Tensor:
             values = actions[..., 0].sum(dim=2)
             return torch.where(values > 1.5, torch.nan, values)
 
@@ -124,7 +123,7 @@ class PlannerConformance:
         assert (plan.objective <= 1.5).all()
 
     def test_a_problem_that_is_all_nan_is_named(self, planner: Planner, space: ActionSpace) -> None:
-        def score(problems: Tensor, actions: Tensor) -> Tensor:
+        def score(problems: torch.Tensor, actions: torch.Tensor) -> torch.Tensor:
             return exact_bowls(problems, actions).where(problems[:, None] != 3, torch.nan)
 
         with pytest.raises(FloatingPointError, match=r"\[3\]"):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from torch import Tensor
 
 from stitching.envs.protocol import ActionSpace
 from stitching.methods.protocol import Proposal, Stitcher
@@ -16,7 +15,7 @@ def streams(n: int) -> list[np.random.Generator]:
     return [stream("conformance", i) for i in range(n)]
 
 
-def proposed(stitcher: Stitcher, states: Tensor) -> Proposal:
+def proposed(stitcher: Stitcher, states: torch.Tensor) -> Proposal:
     """From a skill's end to the next one."""
     return stitcher.propose(states, 0, 1, streams(len(states)))
 
@@ -29,7 +28,7 @@ class StitcherConformance:
     """
 
     def test_proposals_are_actions(
-        self, stitcher: Stitcher, states: Tensor, space: ActionSpace
+        self, stitcher: Stitcher, states: torch.Tensor, space: ActionSpace
     ) -> None:
         for n in (1, len(states)):
             proposal = proposed(stitcher, states[:n])
@@ -52,14 +51,14 @@ class StitcherConformance:
         assert isinstance(stitcher.until_value_falls, bool)
 
     def test_it_leads_to_a_first_skill_where_it_says_so(
-        self, stitcher: Stitcher, states: Tensor
+        self, stitcher: Stitcher, states: torch.Tensor
     ) -> None:
         if stitcher.before_first:
             proposal = stitcher.propose(states, None, 1, streams(len(states)))
             assert len(proposal.actions) == len(states)
 
     def test_a_proposal_belongs_to_its_stream_and_state(
-        self, stitcher: Stitcher, states: Tensor
+        self, stitcher: Stitcher, states: torch.Tensor
     ) -> None:
         together = proposed(stitcher, states)
         torch.manual_seed(0)
@@ -73,7 +72,7 @@ class StitcherConformance:
             assert alone.wanted[0] == together.wanted[row]
 
     def test_the_global_state_of_chance_is_left_alone(
-        self, stitcher: Stitcher, states: Tensor
+        self, stitcher: Stitcher, states: torch.Tensor
     ) -> None:
         before, numpys = torch.get_rng_state(), np.random.get_state()  # noqa: NPY002
         proposed(stitcher, states)

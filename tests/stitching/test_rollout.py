@@ -264,7 +264,9 @@ from stitching.rollout import play_from_start
 torch.set_num_threads(1)
 maze, agent, stitchers, config, plays, step_limit = pickle.load(sys.stdin.buffer)
 outcomes = [
-    play_from_start(maze.vector_env(), agent, stitchers[play.method], maze, config, play, step_limit)
+    play_from_start(
+        maze.vector_env(), agent, stitchers[play.method], maze, config, play, step_limit
+    )
     for play in plays
 ]
 pickle.dump(outcomes, sys.stdout.buffer)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy  # loads its parts when they are used
 
 from stitching.envs.kitchen import JOINTS, START, STEP_SECONDS, TOP_SPEED, kitchen_model
 
@@ -15,7 +15,7 @@ STRIDE = TOP_SPEED * STEP_SECONDS  # rad, or m of a finger, asked for by an acti
 
 # The hand level and pointing away from the robot (+y), fingers side by side along x. Columns are
 # the axes of the `end_effector` site: x up, y to the right, z out of the palm.
-LEVEL = Rotation.from_matrix([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+LEVEL = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 
 DAMPING = 0.05  # of the least squares, in m
 TURN_WEIGHT = 0.25  # m of position error that one rad of orientation error is worth
@@ -23,9 +23,11 @@ TURN_SPEED = 0.15  # rad a step
 POSTURE_PULL = 0.3  # towards home, of what the hand's pose leaves free, a step
 
 
-def hand_turn(yaw: float, pitch: float, roll: float) -> Rotation:
+def hand_turn(yaw: float, pitch: float, roll: float) -> scipy.spatial.transform.Rotation:
     """The hand's orientation: turned left by yaw, its tip up by pitch, about itself by roll."""
-    return Rotation.from_euler("ZX", [yaw, pitch]) * LEVEL * Rotation.from_euler("z", roll)
+    Rotation = scipy.spatial.transform.Rotation
+    level = Rotation.from_matrix(LEVEL)
+    return Rotation.from_euler("ZX", [yaw, pitch]) * level * Rotation.from_euler("z", roll)
 
 
 class Arm:
@@ -52,13 +54,21 @@ class Arm:
         return self._data.site_xpos[self._hand].copy()
 
     @property
-    def turn(self) -> Rotation:
-        return Rotation.from_matrix(self._data.site_xmat[self._hand].reshape(3, 3))
+    def turn(self) -> scipy.spatial.transform.Rotation:
+        return scipy.spatial.transform.Rotation.from_matrix(
+            self._data.site_xmat[self._hand].reshape(3, 3)
+        )
 
     def site(self, name: str) -> np.ndarray:
         return self._data.site(name).xpos.copy()
 
-    def reach(self, position: np.ndarray, turn: Rotation, speed: float, grip: float) -> np.ndarray:
+    def reach(
+        self,
+        position: np.ndarray,
+        turn: scipy.spatial.transform.Rotation,
+        speed: float,
+        grip: float,
+    ) -> np.ndarray:
         """Action (9,) that moves the hand towards a pose by at most `speed` m.
 
         Damped least squares on the pose (Wampler 1986); what that leaves free goes home.
