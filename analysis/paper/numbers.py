@@ -44,28 +44,6 @@ def paper_tasks(number: str) -> dict[str, int]:
     return dict(zip(cells["row"], cells["tasks"].astype(int), strict=True))
 
 
-def net_gain_check() -> pd.DataFrame:
-    """Table 5's printed net gains against those recomputed from its rounded scores.
-
-    A gain is (with - without) / without. Both scores are rounded, so the true gain lies in
-    [low, high]; a printed gain in there is explained by rounding, one outside is an error.
-
-    Columns row, printed, recomputed, low, high, explained_by_rounding.
-    """
-    scores = paper_table("5").set_index(["method", "row"])["score"]
-    without, with_stitch = scores.loc["no-stitch"], scores.loc["mb-stitch"]
-    checked = pd.DataFrame(
-        {
-            "printed": scores.loc[NET_GAIN],
-            "recomputed": with_stitch / without - 1,
-            "low": (with_stitch - HALF_DIGIT) / (without + HALF_DIGIT) - 1,
-            "high": (with_stitch + HALF_DIGIT) / (without - HALF_DIGIT) - 1,
-        }
-    )
-    checked["explained_by_rounding"] = checked["printed"].between(checked["low"], checked["high"])
-    return checked.reset_index().rename_axis(columns=None)
-
-
 def accomplished_skills(number: str, method: str) -> pd.Series:
     """Score × task length of a method in a table whose rows read "<length> <noun>"."""
     cells = paper_table(number).query("method == @method").set_index("row")["score"]

@@ -5,7 +5,7 @@ that publishing is idempotent: whatever a kill left half done, the next publish 
 MLflow is imported inside functions, because that takes seconds and most commands need none of it.
 """
 
-from orchestrator.tracking.publishing import PublishOutcome, pending, prepare, publish
+from orchestrator.tracking.publishing import PublishOutcome, publish
 from orchestrator.tracking.stores import default_uri
 
-__all__ = ["PublishOutcome", "default_uri", "pending", "prepare", "publish"]
+__all__ = ["PublishOutcome", "default_uri", "publish"]

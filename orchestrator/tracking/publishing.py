@@ -34,30 +34,6 @@ class PublishOutcome:
     skipped: bool = False  # everything was there already
 
 
-def pending(run_dir: Path, uri: str) -> bool:
-    """Whether the last publish failed, was killed or saw other files. Imports no MLflow."""
-    receipt = read_receipt(run_dir)
-    return (
-        receipt is None
-        or receipt.uri != without_password(uri)
-        or receipt.published != news(run_dir)
-        or is_gone(uri)
-    )
-
-
-def prepare(uri: str) -> PublishOutcome:
-    """Import MLflow and create the store's schema ahead of time, in a background thread if wanted.
-
-    Threads and processes that publish meanwhile wait for their turn.
-    """
-    try:
-        with turn_to_write(uri):
-            connect(uri)
-    except Exception as error:
-        return PublishOutcome(ok=False, error=_one_line(error, uri))
-    return PublishOutcome(ok=True)
-
-
 def publish(run_dir: Path, uri: str, *, finished: bool, failed: bool = False) -> PublishOutcome:
     """Make MLflow show what the run directory holds; cheap if it already does.
 

@@ -128,6 +128,7 @@ def make_showcase() -> dict[str, Any]:
     stuck = [*paths["g0"], *[[1, 1], [2, 1]] * 4]
     task = "g0>g1>g3>g2"
     return {
+        "kind": "map",
         "layout": LAYOUT,
         "spawn": [7, 4],
         "goals": goals,

@@ -131,6 +131,7 @@ def kitchen_files() -> dict[str, Any]:
             {"name": f"demonstrations-{n}", "orders": [order]} for n, order in enumerate(ORDERS)
         ],
         "showcase": {
+            "kind": "physics",
             "benchmark": "kitchen",
             "task": "microwave>kettle",
             "episode": 2,

@@ -1,6 +1,5 @@
 """The report of a Kitchen run; that of the maze is tested in test_report."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -93,15 +92,13 @@ def test_a_run_that_has_only_begun_can_be_reported(tmp_path: Path, write_run: An
 
 
 def test_the_maze_is_reported_as_before(tmp_path: Path, write_run: Any) -> None:
-    """Its datasets tell no orders, and its old showcase no benchmark."""
+    """Its datasets tell no orders."""
     plain = write_run(tmp_path / "plain")
     told = write_run(tmp_path / "told", datasets=[{"name": "demonstrations", "rows": 9}])
-    named = json.loads((plain / "showcase.json").read_text()) | {"benchmark": "maze"}
-    again = write_run(tmp_path / "again", showcase=named)
-    for run_dir in (plain, told, again):
+    for run_dir in (plain, told):
         build_report(run_dir)
     report = contents(plain / "report")
-    assert report == contents(told / "report") == contents(again / "report")
+    assert report == contents(told / "report")
     assert not STUDIES & set(report)
     assert b"Are the models right?" not in report["index.html"]
     assert b"Framed" not in report["index.html"]

@@ -56,12 +56,11 @@ def draw_showcases(run: Run, folder: Path) -> list[Drawn]:
     """Of every part, or of the run itself."""
     drawn = []
     for part, showcase in run.showcases.items():
-        draw = SHOWCASES.get(showcase.get("benchmark", "maze"), _physics)
-        drawn += draw(_Shown(part, showcase, run.spec), folder)
+        drawn += SHOWCASES[showcase["kind"]](_Shown(part, showcase, run.spec), folder)
     return drawn
 
 
-def _maze(shown: _Shown, folder: Path) -> list[Drawn]:
+def _map(shown: _Shown, folder: Path) -> list[Drawn]:
     save(draw_showcase(shown.showcase, shown.spec.methods), folder, shown.name("showcase"))
     return [shown.drawn("showcase", SHOWCASE_CAPTION)]
 
@@ -103,4 +102,5 @@ def _which_episode(shown: _Shown) -> str:
     return f"{played}: {last} accomplishes more than {first} in {better}; the first of them."
 
 
-SHOWCASES = {"maze": _maze}  # all others: physics
+SHOWCASES = {"map": _map, "physics": _physics}
+"""How a kind of recording is drawn."""

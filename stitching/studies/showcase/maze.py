@@ -52,6 +52,7 @@ def maze_showcase(maze: Maze, demonstrations: Transitions, shown: Shown) -> dict
             }
         )
     return {
+        "kind": "map",
         "layout": list(maze.layout),
         "spawn": list(maze.spawn),
         "goals": {name: list(cell) for name, cell in maze.goals},

@@ -74,6 +74,7 @@ def physics_showcase(benchmark: Benchmark, shown: Shown) -> dict[str, Any]:
     better = np.flatnonzero(scores[-1] > scores[0])
     number = int(better[0]) if len(better) else int(scores[-1].argmax())
     return {
+        "kind": "physics",
         "benchmark": benchmark.name,
         "task": ">".join(shown.task),
         "episode": number,

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator import tracking
 from orchestrator.tracking import default_uri
+from orchestrator.tracking.stores import connect, turn_to_write
 from tests.orchestrator.tracking.fake_run import finish_run, start_run, train_run
 
 
@@ -18,7 +18,8 @@ def run_dir(tmp_path: Path) -> Path:
 @pytest.fixture(scope="session")
 def fresh_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("store")
-    assert tracking.prepare(default_uri(folder)).ok
+    with turn_to_write(default_uri(folder)):
+        connect(default_uri(folder))
     return folder / "mlflow.db"
 
 

@@ -6,18 +6,16 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.tracking import PublishOutcome, default_uri, pending, publish
+from orchestrator.tracking import PublishOutcome, default_uri, publish
 from orchestrator.tracking.receipt import DATED
 from tests.orchestrator.tracking.fake_run import Seen
 
 
 def test_unchanged_content_is_skipped_without_importing_mlflow(run_dir: Path, uri: str) -> None:
     assert publish(run_dir, uri, finished=True).ok
-    assert not pending(run_dir, uri)
     code = (
         "import sys; from pathlib import Path; from orchestrator import tracking\n"
         f"run, uri = Path({str(run_dir)!r}), {uri!r}\n"
-        "assert not tracking.pending(run, uri)\n"
         "assert tracking.publish(run, uri, finished=False).skipped\n"
         "assert tracking.publish(run, uri, finished=True).skipped\n"
         "assert 'mlflow' not in sys.modules and 'pandas' not in sys.modules"
@@ -26,25 +24,26 @@ def test_unchanged_content_is_skipped_without_importing_mlflow(run_dir: Path, ur
     assert Seen(uri).states()[0] == "FINISHED"
 
 
-def test_pending_until_published(run_dir: Path, uri: str, tmp_path: Path) -> None:
-    assert pending(run_dir, uri)
-    publish(run_dir, uri, finished=True)
-    assert not pending(run_dir, uri)
-    assert pending(run_dir, default_uri(tmp_path / "elsewhere"))
+def test_what_is_published_again(run_dir: Path, uri: str, tmp_path: Path) -> None:
+    def skipped(where: str = uri) -> bool:
+        return publish(run_dir, where, finished=True).skipped
+
+    assert not skipped()
+    assert skipped()
     for dated in DATED:  # which alone are no news
         (run_dir / dated).write_text((run_dir / dated).read_text() + " ")
-    assert not pending(run_dir, uri)
+    assert skipped()
     (run_dir / "report" / "figures" / "scores.svg").write_text("another figure")
-    assert pending(run_dir, uri)
-    publish(run_dir, uri, finished=True)
+    assert not skipped()
     Path(uri.removeprefix("sqlite:///")).unlink()
-    assert pending(run_dir, uri)  # the view is gone, the truth is not
+    assert not skipped()  # the view is gone, the truth is not
+    assert not skipped(default_uri(tmp_path / "elsewhere"))
 
 
 @pytest.mark.parametrize("content", ["", "{", "[]", '{"uri": "x"}'])
 def test_a_damaged_receipt_counts_as_none(run_dir: Path, uri: str, content: str) -> None:
     (run_dir / "tracking.json").write_text(content)
-    assert pending(run_dir, uri)
+    assert not publish(run_dir, uri, finished=True).skipped
 
 
 def test_a_run_that_never_began_has_nothing_to_show(run_dir: Path, uri: str) -> None:
