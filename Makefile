@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := stitching orchestrator sweeps analysis tests docs
 
-.PHONY: help setup reproduce test lint bench wheel clean browser constraints
+.PHONY: help setup reproduce test lint bench docs wheel clean browser constraints
 
 help:  ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -33,18 +33,25 @@ lint: setup  ## style and types
 bench: setup  ## ratios that the documentation quotes, each within one run
 	$(BIN)/python -m tests.bench
 
+docs: $(VENV)/.docs  ## these pages as a site, with an API reference, in site/
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
+$(VENV)/.docs: $(VENV)/.installed
+	$(BIN)/pip install --quiet --editable '.[docs]' --constraint constraints.txt
+	touch $@
+
 wheel: setup  ## a wheel in dist/
 	rm -rf build  # what an earlier one left would be packed, too
 	$(BIN)/pip wheel --quiet --no-deps --wheel-dir dist .
 
 clean:  ## delete what builds and checks leave; runs/ and the environment stay
-	rm -rf build dist *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf build dist site *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -not -path './$(VENV)/*' -prune -exec rm -rf {} +
 
 # The report is tested in a real browser; Debian's is the one that needs no download of its own.
 browser:
 	@command -v chromium >/dev/null || (apt-get update -qq && apt-get install -y -qq --no-install-recommends chromium)
 
-constraints: setup
+constraints: $(VENV)/.docs
 	(echo "# Exact versions that this revision is tested with. Written by 'make constraints'."; \
 	 $(BIN)/pip freeze --exclude-editable | sed 's/+cpu$$//') > constraints.txt

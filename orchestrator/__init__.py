@@ -70,10 +70,10 @@ def reproduce(
     """
     from pathlib import Path
 
-    from orchestrator.reproduce import Settings
-    from orchestrator.reproduce_suite import reproduce_asked
+    from orchestrator.reproduction import Settings
     from orchestrator.storage.rundir import default_out
     from orchestrator.storage.store import USUAL_STORE
+    from orchestrator.suite_reproduction import reproduce_asked
     from orchestrator.work.progress import Silent
 
     settings = Settings(

@@ -21,6 +21,7 @@ from orchestrator.spec.tomls import packaged_specs
 from stitching.registry import PartError
 
 INTERRUPTED, UNREAD, TERMINATED = 130, 141, 143  # as shells count SIGINT, SIGPIPE and SIGTERM
+RUN_PACKAGES = ("torch", "mujoco", "ray", "optuna", "mlflow", "gymnasium_robotics", "robosuite")
 ERRORS = Console(stderr=True, highlight=False, soft_wrap=True)
 OUTPUT = Console(highlight=False, soft_wrap=True)
 
@@ -36,6 +37,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.exit(error.exit_code)
     except PartError as error:
         ERRORS.print(f"error: {error}; mend or uninstall it", markup=False)
+        sys.exit(UsageError.exit_code)
+    except ModuleNotFoundError as error:
+        if error.name not in RUN_PACKAGES:
+            raise
+        ERRORS.print(
+            f"error: {error.name} is not installed; this command needs more than runs that are "
+            "there: pip install 'skillstitch[run]'",
+            markup=False,
+        )
         sys.exit(UsageError.exit_code)
     except KeyboardInterrupt:
         ERRORS.print("interrupted; the same command resumes", markup=False)
@@ -132,9 +142,7 @@ def _list(words: list[str]) -> None:
 
 
 def _report(words: list[str]) -> None:
-    from analysis.report import build_report
-    from orchestrator.spec_commands import export
-    from orchestrator.storage.merge import merge_again
+    from orchestrator.reporting import report_again
     from orchestrator.storage.rundir import RunDirectory
     from orchestrator.tracking.run import catch_up
 
@@ -150,26 +158,50 @@ def _report(words: list[str]) -> None:
         """
         directory = RunDirectory(run)
         if directory.asked_sweep():
-            from sweeps.sweep import report_again
+            from sweeps.sweep import report_again as sweep_report_again
 
             with said_to_users():
-                report_again(directory, results, force=force)
+                sweep_report_again(directory, results, force=force)
             OUTPUT.print(f"wrote {run / 'report' / 'index.md'}", markup=False)
             return
-        suite = directory.is_suite  # a clear error where there is no run
-        with directory.locked(), said_to_users():
-            if suite:
-                merge_again(directory)
-            page = run / "report" / "index.html"
-            if results is None:
-                build_report(run)
-        if results is not None:  # builds it, too
-            export(run, results, OUTPUT, force=force)
-        OUTPUT.print(f"wrote {page}", markup=False)
-        if trouble := catch_up(RunDirectory(run)):
+        for line in report_again(run, results, force=force):
+            OUTPUT.print(line, markup=False)
+        if trouble := catch_up(directory):
             ERRORS.print(f"tracking: {trouble}", markup=False)
 
     tyro.cli(report, args=words, prog="skillstitch report")
+
+
+def _enjoy(words: list[str]) -> None:
+    from orchestrator.film import film
+    from orchestrator.replay import Asked
+    from orchestrator.storage.rundir import RunDirectory
+
+    def enjoy(
+        run: tyro.conf.Positional[Path],
+        task: str,
+        method: str,
+        seed: int = 0,
+        episode: int | None = None,
+        store: Path | None = None,
+        out: Path | None = None,
+    ) -> None:
+        """Play an episode of a run again, exactly, and write it as a film and as pictures.
+
+        Args:
+            run: the run directory.
+            task: its skills in their order, as "microwave>kettle".
+            method: one of the run's methods.
+            seed: whose models play.
+            episode: its number, from 0; default: the first that accomplishes most.
+            store: where the models are kept; default: where the run was last carried out.
+            out: the film; default: RUN/episodes/<task>-<method>-<seed>-<episode>.mp4.
+        """
+        asked = Asked(tuple(task.split(">")), method, seed, episode)
+        for line in film(RunDirectory(run), asked, store, out):
+            OUTPUT.print(line, markup=False)
+
+    tyro.cli(enjoy, args=words, prog="skillstitch enjoy")
 
 
 def _compare(words: list[str]) -> None:
@@ -240,6 +272,7 @@ COMMANDS: dict[str, tuple[Callable[[list[str]], None], str]] = {
     "status": (_status, "how far a run directory is"),
     "list": (_list, "every run and sweep in a folder, and how far each is"),
     "report": (_report, "write a run's or sweep's report again, and export its tables"),
+    "enjoy": (_enjoy, "an episode of a run, played again, as a film"),
     "compare": (_compare, "two runs side by side, paired"),
     "doctor": (_doctor, "check this machine and the installation"),
     "gc": (_gc, "delete artifacts and blocks that no run directory needs"),

@@ -112,9 +112,10 @@ def plan(words: list[str], output: Console) -> None:
 def run(words: list[str], output: Console, errors: Console) -> None:
     """`skillstitch run SPEC [options]`."""
     from orchestrator.printing import summary_lines
-    from orchestrator.reproduce import Settings
-    from orchestrator.reproduce_suite import reproduce_asked
+    from orchestrator.reporting import export
+    from orchestrator.reproduction import Settings
     from orchestrator.storage.rundir import RunDirectory, default_out
+    from orchestrator.suite_reproduction import reproduce_asked
     from orchestrator.work.progress import ConsoleProgress
 
     command, asked = _with_spec(RunCommand, "run", words)
@@ -142,19 +143,9 @@ def run(words: list[str], output: Console, errors: Console) -> None:
                 raise
             incomplete = error
     if command.results is not None:
-        export(out, command.results, output, force=command.force)
+        for line in export(out, command.results, force=command.force):
+            output.print(line, markup=False)
     for line in summary_lines(RunDirectory(out)):
         output.print(line, markup=False)
     if incomplete is not None:
         raise incomplete
-
-
-def export(run: Path, results: Path, output: Console, *, force: bool) -> None:
-    """Copy a run's tables, figures and report to RESULTS/<table>/."""
-    from analysis.report import export_results
-    from orchestrator.storage.rundir import RunDirectory
-
-    with RunDirectory(run).locked(), said_to_users():
-        folders = export_results(run, results, force=force)
-    for folder in folders:
-        output.print(f"exported {folder}", markup=False)

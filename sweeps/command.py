@@ -12,7 +12,7 @@ from rich.console import Console
 from analysis.results import check_results
 from orchestrator.errors import UsageError, said_to_users
 from orchestrator.executors import ExecutorKind
-from orchestrator.reproduce import Settings
+from orchestrator.reproduction import Settings
 from orchestrator.spec.tomls import Scale
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.storage.store import USUAL_STORE

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from analysis.schema import PROVENANCE
 from orchestrator.errors import ChangedError, UsageError
-from orchestrator.reproduce import LazyExecutor, Settings
+from orchestrator.reproduction import LazyExecutor, Settings
 from orchestrator.spec.structure import Plain, structure, to_plain
 from orchestrator.storage import locking
 from orchestrator.storage.claim import claim_for_spec, spec_of

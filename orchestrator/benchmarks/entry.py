@@ -10,6 +10,8 @@ from orchestrator.builders.parts import Builder
 from orchestrator.spec.structure import Plain
 from stitching.bounds import Bounded
 from stitching.envs.protocol import Benchmark
+from stitching.models.agent import Agent
+from stitching.studies.showcase.recorder import EpisodeRecorder
 
 TRAINING_DATA = "every dataset that skills are learned from"  # among an illustration's inputs
 
@@ -59,6 +61,7 @@ class BenchmarkEntry:
     extras: dict[str, str] = field(default_factory=dict)  # data not learned from: role → kind
     for_extras: tuple[str, ...] = ()  # settings of the data that no dataset learned from depends on
     illustrations: dict[str, Illustration] = field(default_factory=dict)  # by name
+    recorder: Callable[[Agent], EpisodeRecorder] | None = None  # of an episode, for films
     long_horizon: Callable[[Any], str] = lambda config: ""  # kind of Single-Policy's data, if any
     label: Callable[[Any], str] = lambda config: ""  # of unusual data; every table shows it
 

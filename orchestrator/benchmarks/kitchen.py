@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from functools import partial
 from pathlib import Path
 
 from orchestrator.benchmarks.entry import BenchmarkEntry, Costs, Dataset, physics_illustrations
@@ -12,6 +13,7 @@ from orchestrator.builders.studies import Studies
 from orchestrator.errors import UsageError
 from stitching.data.kitchen.demonstrations import KitchenDataConfig, Order, orders
 from stitching.envs.kitchen import GROUPS, KITCHEN
+from stitching.studies.showcase.physics import StepRecorder
 
 
 def _datasets(config: KitchenDataConfig) -> dict[str, Dataset]:
@@ -90,6 +92,7 @@ KITCHEN_ENTRY = BenchmarkEntry(
         pairs=20,
         episodes=6,
     ),
+    recorder=partial(StepRecorder, KITCHEN),
     long_horizon=_long_horizon,
     label=_label,
 )

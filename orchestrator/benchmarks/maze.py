@@ -7,6 +7,7 @@ from orchestrator.builders.maze import MAZE_BUILDERS
 from orchestrator.builders.studies import maze_showcase_builder
 from stitching.data.maze import MazeDataConfig
 from stitching.envs.maze import MAZE
+from stitching.studies.showcase.maze import PathRecorder
 
 
 def _datasets(config: MazeDataConfig) -> dict[str, Dataset]:
@@ -35,4 +36,5 @@ MAZE_ENTRY = BenchmarkEntry(
             task=("g0", "g1", "g3", "g2"),  # the paper's Figure 1
         )
     },
+    recorder=lambda agent: PathRecorder(MAZE),
 )

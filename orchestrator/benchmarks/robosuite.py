@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from orchestrator.benchmarks.entry import BenchmarkEntry, Costs, Dataset, physics_illustrations
 from orchestrator.builders.robosuite import ROBOSUITE_BUILDERS
 from orchestrator.builders.studies import Studies
@@ -10,6 +12,7 @@ from stitching.envs.protocol import Benchmark
 from stitching.envs.robosuite.can import CAN
 from stitching.envs.robosuite.door import DOOR
 from stitching.envs.robosuite.vector_env import GROUPS
+from stitching.studies.showcase.physics import StepRecorder
 
 STUDIES = Studies("robosuite", {DOOR.name: DOOR, CAN.name: CAN}, GROUPS)
 
@@ -36,6 +39,7 @@ def _entry(benchmark: Benchmark, *task: str) -> BenchmarkEntry:
         extras={"held-out": "robosuite-held-out"},
         for_extras=("held_out",),
         illustrations=physics_illustrations("robosuite", task, pairs=1, episodes=30),
+        recorder=partial(StepRecorder, benchmark),
     )
 
 

@@ -33,10 +33,10 @@ def check_packages() -> list[Finding]:
     try:
         required = importlib.metadata.requires(DISTRIBUTION) or []
     except importlib.metadata.PackageNotFoundError:
-        advice = "run `pip install -e .` in the source tree"
+        advice = "run `pip install -e '.[run]'` in the source tree"
         return [Finding(DISTRIBUTION, "fault", "not installed", advice)]
     requirements = [Requirement(line) for line in required]
-    needed = [r for r in requirements if r.marker is None or r.marker.evaluate({"extra": ""})]
+    needed = [r for r in requirements if r.marker is None or r.marker.evaluate({"extra": "run"})]
     return [judge_package(requirement, installed(requirement.name)) for requirement in needed]
 
 

@@ -1,4 +1,4 @@
-"""The append-only record of finished blocks: one SQLite file, one writer, torn-write safe."""
+"""The record of finished blocks: one SQLite file, one writer, torn-write safe."""
 
 from __future__ import annotations
 

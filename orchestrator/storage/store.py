@@ -47,7 +47,7 @@ class Artifact:
         return content.hexdigest()
 
     def files(self) -> dict[str, bytes]:
-        """The content as files: datasets a .npy a column, so that they can be memory-mapped;
+        """The content as files: datasets a .npy a column, which numpy reads anywhere;
         weights as one safetensors file."""
         info = {"info.json": json.dumps(self.info, sort_keys=True).encode()}
         if self.info.get("format") == "columns":

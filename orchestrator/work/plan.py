@@ -122,6 +122,10 @@ class Plan:
         models = set(self.models.values())
         return models.union(*(self.recipes[key].inputs.values() for key in models))
 
+    def first_method(self, method: str) -> str:
+        """In whose name a method's first skills are played: its own, or SHARED."""
+        return first_method(method, self.spec.rollout)
+
     def roots(self) -> Iterator[Node]:
         return (node for node in self.nodes if node.parent is None)
 

@@ -18,14 +18,14 @@ from orchestrator.work.jobs import BlockReport, BlockTask, PlayJob, Report
 from stitching.envs.protocol import VectorEnv
 from stitching.methods.protocol import Models
 from stitching.models.agent import Agent
-from stitching.rollout import Block, begin, play_segment
+from stitching.rollout import Block, Recorder, begin, play_segment
 
 
 class BlockPlayer:
     """Plays blocks; keeps loaded models and environments between them, and nothing else."""
 
     def __init__(self) -> None:
-        self._models: dict[tuple[str, str], Any] = {}
+        self._loaded: dict[tuple[str, str], Any] = {}
         self._envs: dict[tuple[str, str], VectorEnv] = {}
 
     def play(self, job: PlayJob, artifacts: Mapping[str, Artifact]) -> Report:
@@ -35,20 +35,28 @@ class BlockPlayer:
         for task, parent in job.tasks:
             began = time.perf_counter()
             try:
-                outcome = self._play_block(task, parent, artifacts)
+                outcome = self.outcome(task, parent, artifacts)
                 segments, seconds = len(outcome.arrays["episode"]), time.perf_counter() - began
                 reports.append(BlockReport(task.key, outcome.to_bytes(), "", segments, seconds))
             except Exception:
                 reports.append(BlockReport(task.key, None, traceback.format_exc(limit=-3)))
         return Report(job, blocks=tuple(reports), seconds=time.perf_counter() - started)
 
-    def _play_block(
-        self, task: BlockTask, parent: Outcome | None, artifacts: Mapping[str, Artifact]
+    def policy(self, task: BlockTask, artifacts: Mapping[str, Artifact]) -> Agent:
+        """What executes the skills of a block."""
+        return self._models_of(task, artifacts).one(method_of(task.method).policy, Agent)
+
+    def outcome(
+        self,
+        task: BlockTask,
+        parent: Outcome | None,
+        artifacts: Mapping[str, Artifact],
+        recorder: Recorder | None = None,
     ) -> Outcome:
+        """What one block's episodes do; a recorder changes nothing. Artifacts by key."""
         benchmark = BENCHMARKS[task.benchmark]
         method = method_of(task.method)
-        trained = {kind: self._model(task, kind, artifacts) for kind in task.artifacts}
-        models = Models(benchmark.actions, len(benchmark.skills), trained)
+        models = self._models_of(task, artifacts)
         agent = models.one(method.policy, Agent)
         stitcher = method.stitcher(task.settings, models)
         episodes, used, snapshots = survivors(task, parent)
@@ -58,7 +66,7 @@ class BlockPlayer:
         env = self._env(task)
         begin(env, block, snapshots)
         segments = play_segment(
-            env, agent, stitcher, benchmark, task.rollout, block, task.step_limit - used
+            env, agent, stitcher, benchmark, task.rollout, block, task.step_limit - used, recorder
         )
         return Outcome(
             {
@@ -73,6 +81,11 @@ class BlockPlayer:
             }
         )
 
+    def _models_of(self, task: BlockTask, artifacts: Mapping[str, Artifact]) -> Models:
+        benchmark = BENCHMARKS[task.benchmark]
+        trained = {kind: self._model(task, kind, artifacts) for kind in task.artifacts}
+        return Models(benchmark.actions, len(benchmark.skills), trained)
+
     def _env(self, task: BlockTask) -> VectorEnv:
         place = task.benchmark, method_of(task.method).policy
         if place not in self._envs:
@@ -81,10 +94,10 @@ class BlockPlayer:
 
     def _model(self, task: BlockTask, kind: str, artifacts: Mapping[str, Artifact]) -> Any:
         key = task.artifacts[kind]
-        if (kind, key) not in self._models:
+        if (kind, key) not in self._loaded:
             benchmark = BENCHMARKS[task.benchmark]
-            self._models[kind, key] = LOADERS[kind](artifacts[key], benchmark)
-        return self._models[kind, key]
+            self._loaded[kind, key] = LOADERS[kind](artifacts[key], benchmark)
+        return self._loaded[kind, key]
 
 
 def survivors(

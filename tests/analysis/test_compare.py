@@ -13,6 +13,7 @@ from analysis.compare import (
     settings_markdown,
 )
 from analysis.tables.writers import seed_note
+from tests.rows import row
 
 
 @pytest.fixture
@@ -36,7 +37,7 @@ def test_a_difference_is_found_and_paired(
     run_b = write_run(tmp_path / "b", segments=worse)
     comparison = compare(run_a, run_b).set_index(["row", "method"])
     assert comparison.loc[("2 goals", "mb-stitch"), "score_b"] == 0.5
-    changed = comparison.loc[("2 goals", "mb-stitch")]
+    changed = row(comparison, "2 goals", "mb-stitch")
     assert changed["b_minus_a"] == pytest.approx(changed["score_b"] - changed["score_a"])
     assert changed["ci_high"] < -0.4
     assert comparison.loc[("2 goals", "no-stitch"), "b_minus_a"] == 0

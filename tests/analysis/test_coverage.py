@@ -59,5 +59,5 @@ def test_three_seeds_cover_what_training_gives_as_far_as_three_can(
         low, high = ends(
             scores_of([base.retrained(rng, effect) for _ in range(3)], rng, EPISODES), rng
         )
-        covered += low <= truth <= high
+        covered += bool(low <= truth <= high)
     assert covered / TREES >= promised

@@ -175,7 +175,7 @@ def test_a_method_may_have_first_skills_of_its_own(segments: Any, spec: RunSpec)
     both = pd.concat([segments.query("depth == 1 or method != 'no-stitch'"), failing])
     with pytest.raises(RunError, match="own_first_skill"):
         episodes_from_segments(both, spec)
-    episodes = episodes_from_segments(both, replace(spec, own_first_skill={"no-stitch"}))
+    episodes = episodes_from_segments(both, replace(spec, own_first_skill=frozenset({"no-stitch"})))
     scores = episodes.groupby("method")["score"].mean()
     assert scores["no-stitch"] == 0
     assert scores["mb-stitch"] > 0.9
@@ -184,7 +184,7 @@ def test_a_method_may_have_first_skills_of_its_own(segments: Any, spec: RunSpec)
 def test_until_they_are_played_such_a_method_has_no_episodes(segments: Any, spec: RunSpec) -> None:
     """It must not borrow the shared first skills."""
     episodes = episodes_from_segments(
-        segments.query("method != 'no-stitch'"), replace(spec, own_first_skill={"no-stitch"})
+        segments.query("method != 'no-stitch'"), replace(spec, own_first_skill=frozenset({"no-stitch"}))
     )
     assert "no-stitch" not in set(episodes["method"])
 

@@ -15,7 +15,7 @@ from stitching.envs.protocol import ActionSpace
 from stitching.models.layers import Params, init_mlp, mlp
 from stitching.planning.cem import CEM
 from stitching.planning.objective import conservative_value
-from stitching.planning.protocol import Plan, Planner
+from stitching.planning.protocol import PlannedActions, Planner
 from tests.bench.result import Result, alternate
 
 MEMBERS, WIDTH, OBSERVATION, ACTION = 5, 256, 59, 9
@@ -57,7 +57,7 @@ def streams(problems: range) -> list[np.random.Generator]:
     return [np.random.Generator(np.random.Philox(key=problem)) for problem in problems]
 
 
-def in_blocks(planner: Planner, score: KitchenScore, block: int) -> Iterator[Plan]:
+def in_blocks(planner: Planner, score: KitchenScore, block: int) -> Iterator[PlannedActions]:
     for first in range(0, len(score.states), block):
         of_block = replace(score, states=score.states[first : first + block])
         yield planner.plan(of_block, streams(range(first, first + block)), ARM)

@@ -50,6 +50,7 @@ from stitching.planning.cem import CEM
 from stitching.planning.protocol import Score
 from stitching.streams import stream
 from tests.bench.result import Result
+from tests.sections import section, with_sections
 
 BLOCKS = 3
 SEED = 0
@@ -201,7 +202,7 @@ def _ours(totals: Totals, product: MBStitch, block: Problems, exact: Score, numb
     began = process_time()
     # What `propose` does before it keeps the first action.
     score = product.score(block.states, block.following)
-    plan = product.planner.plan(score, streams, product.actions)
+    plan = product.settings.chosen.plan(score, streams, product.models.actions)
     totals.seconds += process_time() - began
     totals.iterations += plan.iterations.tolist()
     totals.gains += [
@@ -236,7 +237,8 @@ def _gain(objective: Objective, plan: Tensor) -> float:
 def _warm_up(setting: Setting, references: list[Reference]) -> None:
     """Imports and first calls, which no run pays for every plan."""
     block = setting.blocks[0]
-    product = replace(setting.product, planner=replace(LIMITS, iterations=2))
+    settings = with_sections(setting.product.settings, replace(LIMITS, iterations=2))
+    product = replace(setting.product, settings=settings)
     score = setting.exact.score(block.states, block.following)
     _ours(Totals(), product, block, score, 0)
     for reference in references:
@@ -286,10 +288,11 @@ def _setting(run: Path | None) -> Setting:
     else:
         models, config = _untrained(spec), spec.dynamics
         blocks = [_random_states(spec.block_episodes, number) for number in range(BLOCKS)]
+    settings = section(spec, MBStitchSettings)
     return Setting(
         "trained" if trained else "untrained",
-        _stitcher(models, config, spec.mb_stitch),
-        _stitcher(models, replace(config, precision="float32"), spec.mb_stitch),
+        _stitcher(models, config, settings),
+        _stitcher(models, replace(config, precision="float32"), settings),
         blocks,
     )
 

@@ -63,5 +63,5 @@ def _name(run: Run, directory: Path | None) -> str:
 def _seconds_to_load() -> float:
     """Python and all that a run imports, before its own clock begins to tick."""
     began = perf_counter()
-    subprocess.run([sys.executable, "-c", "import orchestrator.reproduce"], check=True)
+    subprocess.run([sys.executable, "-c", "import orchestrator.reproduction"], check=True)
     return perf_counter() - began

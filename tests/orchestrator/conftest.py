@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator import reproduce as reproducing
+from orchestrator import reproduction as reproducing
 from orchestrator.executors import open_executor
 from orchestrator.spec.spec import Spec
 from orchestrator.work.plan import Plan, make_plan

@@ -14,6 +14,9 @@ from orchestrator.storage.claim import describe
 from orchestrator.work.plan import Plan, make_plan
 from stitching.data.kitchen.demonstrations import KitchenDataConfig
 from stitching.envs.kitchen import SKILLS
+from stitching.methods.mb_stitch import MBStitchSettings
+from stitching.planning.cem import CEM
+from tests.sections import section
 
 
 @pytest.fixture(scope="module")
@@ -42,10 +45,11 @@ def test_table2_is_the_papers_protocol() -> None:
     assert spec.step_limits == {2: 250, 3: 360, 4: 480}
     # No shorter limit can bind before the skills' own, so all lengths share one tree exactly.
     assert all(limit >= n * spec.rollout.skill_limit for n, limit in spec.step_limits.items())
-    cem = spec.mb_stitch.cem
+    settings = section(spec, MBStitchSettings)
+    cem = section(settings, CEM)
     assert (cem.population, cem.elites, cem.horizon, cem.iterations) == (50, 10, 5, 500)
     assert (cem.momentum, cem.temperature, cem.temperature_discount) == (0.9, 0.5, 0.99)
-    assert (spec.mb_stitch.alpha, spec.mb_stitch.beta, spec.mb_stitch.execute) == (7.0, 5.0, 1)
+    assert (settings.alpha, settings.beta, settings.execute) == (7.0, 5.0, 1)
     assert spec.dynamics.activation == "elu"
 
 

@@ -23,7 +23,9 @@ from orchestrator.storage.claim import claim_for_spec
 from orchestrator.storage.store import Artifact
 from orchestrator.work import playing
 from orchestrator.work.plan import Plan
+from stitching.methods.mb_stitch import MBStitchSettings
 from tests.orchestrator.tiny import TINY, Counted, Place, carry_out, promised_bytes, serially
+from tests.sections import section, with_sections
 
 
 @dataclass(frozen=True)
@@ -203,7 +205,7 @@ def test_run_and_run_again(cli: Cli, place: Place, expected: dict[str, bytes]) -
 
     before = {path: path.stat().st_mtime_ns for path in (place.out / "report").iterdir()}
     started = time.monotonic()
-    with mock.patch("orchestrator.reproduce.open_executor", side_effect=AssertionError):
+    with mock.patch("orchestrator.reproduction.open_executor", side_effect=AssertionError):
         again = cli("run", *options(place))
     assert time.monotonic() - started < 5
     assert again.code == 0
@@ -268,7 +270,7 @@ def test_nondeterminism_is_6(cli: Cli, trained: Place, finished: Place, plan: Pl
             trained.shared().record([(key, theirs[1] + b" ")])
             return super().next()
 
-    with mock.patch("orchestrator.reproduce.open_executor", return_value=Other()):
+    with mock.patch("orchestrator.reproduction.open_executor", return_value=Other()):
         answer = cli("run", *options(trained))
     assert answer.code == 6
     assert f"block {key} was played before with other bytes" in answer.err
@@ -424,7 +426,7 @@ def test_report_of_a_run_that_has_not_played_yet(cli: Cli, spec: Spec, place: Pl
 
 
 def test_compare(cli: Cli, finished: Place, tmp_path: Path, spec: Spec) -> None:
-    other = replace(spec, mb_stitch=replace(spec.mb_stitch, alpha=3.0))
+    other = with_sections(spec, replace(section(spec, MBStitchSettings), alpha=3.0))
     carry_out(other, serially(tmp_path / "other", finished.store_root))
     answer = cli("compare", finished.out, tmp_path / "other")
     assert answer.code == 0
@@ -437,7 +439,9 @@ def test_compare(cli: Cli, finished: Place, tmp_path: Path, spec: Spec) -> None:
 
 def test_gc(cli: Cli, done: Place, plan: Plan, expected: dict[str, bytes], spec: Spec) -> None:
     other = done.root / "other"
-    changed = replace(spec, seeds=3, mb_stitch=replace(spec.mb_stitch, alpha=3.0))
+    changed = with_sections(
+        replace(spec, seeds=3), replace(section(spec, MBStitchSettings), alpha=3.0)
+    )
     carry_out(changed, serially(other, done.store_root))
 
     def everything() -> tuple[set[tuple[str, str]], set[str]]:
@@ -468,7 +472,7 @@ def test_gc(cli: Cli, done: Place, plan: Plan, expected: dict[str, bytes], spec:
     assert answer.out.count("deleted ") == len(before[0]) - len(artifacts) + 2
     assert wanted.is_dir()
     assert not unwanted.exists()
-    with mock.patch("orchestrator.reproduce.open_executor", side_effect=AssertionError):
+    with mock.patch("orchestrator.reproduction.open_executor", side_effect=AssertionError):
         assert cli("run", *options(done)).code == 0
     assert promised_bytes(done.out) == expected
     carry_out(changed, serially(other, done.store_root))  # what was deleted is made again
@@ -492,7 +496,7 @@ def test_paths_with_characters_that_mean_something_in_a_uri(
 def test_gc_deletes_nothing_while_a_run_uses_the_store(cli: Cli, done: Place, spec: Spec) -> None:
     """Not even what no run needs: one at work has not yet said what it needs."""
     other = done.root / "other"
-    changed = replace(spec, mb_stitch=replace(spec.mb_stitch, alpha=4.5))
+    changed = with_sections(spec, replace(section(spec, MBStitchSettings), alpha=4.5))
     found: list[int] = []
 
     def play(*_: object) -> NoReturn:
@@ -532,7 +536,7 @@ def test_gc_keeps_everything_where_a_name_is_wrong(cli: Cli, done: Place) -> Non
 @pytest.mark.slow
 def test_the_installed_command(place: Place, expected: dict[str, bytes]) -> None:
     command = [Path(sys.executable).with_name("skillstitch"), "run", TINY, "--executor", "serial"]
-    paths = ["--out", place.out, "--store", place.store_root]
+    paths: list[str | Path] = ["--out", place.out, "--store", place.store_root]
     for _ in range(2):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         answer = subprocess.run([*command, *paths], capture_output=True, text=True, timeout=240)

@@ -81,7 +81,7 @@ def test_a_source_tree_that_was_never_installed(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(importlib.metadata, "requires", requires)
     (finding,) = packages.check_packages()
     assert finding.status == "fault"
-    assert "pip install -e ." in finding.advice
+    assert "pip install -e '.[run]'" in finding.advice
 
 
 @pytest.mark.parametrize(

@@ -6,13 +6,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from orchestrator import reproduce as reproducing
+from orchestrator import reproduction as reproducing
 from orchestrator.executors.serial import SerialExecutor
-from orchestrator.reproduce import Settings
+from orchestrator.reproduction import Settings
 from orchestrator.spec.spec import Spec
 from orchestrator.work.jobs import Report
 from orchestrator.work.plan import make_plan
 from tests.orchestrator.tiny import Alone, Lines, Place, carry_out, promised_bytes, serially
+from tests.rows import row
 
 METHODS = ("no-stitch", "random-stitch", "mf-stitch", "mb-stitch", "reach-stitch")
 
@@ -155,7 +156,7 @@ def test_a_shorter_limit_is_read_off_the_tree(
             for episode in alive.tolist():
                 accomplished[episode] += 1
         for episode, count in accomplished.items():
-            row = episodes.loc[(seed, method, ">".join(alone.task), episode)]
-            assert row["accomplished"] == count
-            cut += bool(row["steps"] == limit < deep.step_limit)
+            played = row(episodes, seed, method, ">".join(alone.task), episode)
+            assert played["accomplished"] == count
+            cut += bool(played["steps"] == limit < deep.step_limit)
     assert cut

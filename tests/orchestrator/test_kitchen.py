@@ -14,12 +14,16 @@ from orchestrator.storage.store import Store
 from orchestrator.work.plan import Plan, make_plan
 from stitching.data.kitchen.demonstrations import KitchenDataConfig
 from stitching.data.kitchen.segments import Order
+from stitching.methods.mb_stitch import MBStitchSettings
+from stitching.methods.mf_stitch import MFStitchSettings
+from stitching.methods.random_stitch import RandomStitchSettings
 from stitching.methods.single_policy import SinglePolicySettings
 from stitching.models.dynamics import DynamicsConfig
 from stitching.models.iql import IQLConfig
 from stitching.planning.cem import CEM
 from stitching.studies.stitches import START
 from tests.orchestrator.tiny import Alone, Place
+from tests.sections import section, with_sections
 
 ORDER: Order = ("microwave", "kettle", "bottom burner", "slide cabinet")
 METHODS = ("no-stitch", "random-stitch", "mf-stitch", "mb-stitch", "single-policy")
@@ -35,7 +39,7 @@ def spec() -> Spec:
         updates=3000, learning_rate=1e-3, dropout=0.0, members=2, width=32,
         policy_width=256, policy_layers=2, log_every=1000,
     )  # fmt: skip
-    return replace(
+    small = replace(
         spec,
         methods=METHODS,
         lengths=(),
@@ -46,10 +50,14 @@ def spec() -> Spec:
         data=KitchenDataConfig(episodes=12, held_out=1, quality=0.9),  # steady hands
         agent=skills,
         dynamics=DynamicsConfig(updates=300, width=32, members=2, activation="elu"),
-        random_stitch=replace(spec.random_stitch, limit=3),
-        mf_stitch=replace(spec.mf_stitch, limit=3, training=replace(skills, updates=100)),
-        single_policy=SinglePolicySettings(">".join(ORDER), episodes=12, training=skills),
-        mb_stitch=replace(spec.mb_stitch, limit=3, cem=CEM(population=16, elites=4, iterations=10)),
+    )
+    planning = replace(section(spec, MBStitchSettings), limit=3)
+    return with_sections(
+        small,
+        replace(section(spec, RandomStitchSettings), limit=3),
+        replace(section(spec, MFStitchSettings), limit=3, training=replace(skills, updates=100)),
+        SinglePolicySettings(">".join(ORDER), episodes=12, training=skills),
+        with_sections(planning, CEM(population=16, elites=4, iterations=10)),
     )
 
 

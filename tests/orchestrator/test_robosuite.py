@@ -8,10 +8,14 @@ import pytest
 
 from orchestrator.spec.spec import Spec, load_spec
 from orchestrator.work.plan import make_plan
+from stitching.methods.mb_stitch import MBStitchSettings
+from stitching.methods.mf_stitch import MFStitchSettings
+from stitching.methods.random_stitch import RandomStitchSettings
 from stitching.models.dynamics import DynamicsConfig
 from stitching.models.iql import IQLConfig
 from stitching.planning.cem import CEM
 from tests.orchestrator.tiny import Alone, Place
+from tests.sections import section, with_sections
 
 pytestmark = pytest.mark.slow
 
@@ -22,14 +26,18 @@ def small(name: str) -> Spec:
         updates=400, learning_rate=1e-3, dropout=0.0, members=2, width=32, policy_width=128,
         multi_task=False, log_every=200,
     )  # fmt: skip
-    return replace(
+    small = replace(
         spec,
         data=replace(spec.data, quality=1.0, episodes=6, held_out=2),
         agent=skills,
         dynamics=DynamicsConfig(updates=100, width=32, members=2, activation="sigmoid"),
-        random_stitch=replace(spec.random_stitch, limit=2),
-        mf_stitch=replace(spec.mf_stitch, limit=2, training=replace(skills, updates=50)),
-        mb_stitch=replace(spec.mb_stitch, limit=2, cem=CEM(population=16, elites=4, iterations=5)),
+    )
+    planning = replace(section(spec, MBStitchSettings), limit=2)
+    return with_sections(
+        small,
+        replace(section(spec, RandomStitchSettings), limit=2),
+        replace(section(spec, MFStitchSettings), limit=2, training=replace(skills, updates=50)),
+        with_sections(planning, CEM(population=16, elites=4, iterations=5)),
     )
 
 

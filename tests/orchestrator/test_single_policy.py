@@ -11,6 +11,9 @@ from orchestrator.spec.spec import Spec, load_spec
 from orchestrator.spec.tomls import Scale
 from orchestrator.storage.claim import describe
 from orchestrator.work.plan import Plan, make_plan
+from stitching.methods.mb_stitch import MBStitchSettings
+from stitching.methods.single_policy import SinglePolicySettings
+from tests.sections import section, with_sections
 
 METHOD = "single-policy"
 
@@ -36,7 +39,7 @@ def test_the_skills_and_the_dynamics_are_table_2s(scale: Scale) -> None:
     ours, theirs = (make_plan(load_spec(name, scale)) for name in ("table4", "table2"))
     for kind in ("agent", "dynamics"):
         assert ours.by_seed(kind) == theirs.by_seed(kind)
-    assert ours.spec.mb_stitch == theirs.spec.mb_stitch
+    assert section(ours.spec, MBStitchSettings) == section(theirs.spec, MBStitchSettings)
 
 
 @pytest.mark.parametrize("scale", ["quick", "standard"])
@@ -74,9 +77,10 @@ def test_its_demonstrations_teach_it_and_nothing_else(plan: Plan) -> None:
     policy = plan.recipes[plan.by_seed(METHOD)[0]]
     assert list(policy.inputs.values()) == [plan.datasets[role]]
     params = plan.recipes[plan.datasets[role]].params
-    assert ">".join(params["order"]) == plan.spec.single_policy.task
+    assert ">".join(params["order"]) == section(plan.spec, SinglePolicySettings).task
     skills = plan.recipes[plan.datasets["demonstrations-microwave-top-hinge-slide"]].params
-    assert params["config"] == skills["config"] | {"episodes": plan.spec.single_policy.episodes}
+    episodes = section(plan.spec, SinglePolicySettings).episodes
+    assert params["config"] == skills["config"] | {"episodes": episodes}
     others = {*plan.by_seed("agent").values(), *plan.by_seed("dynamics").values()}
     assert not any(plan.datasets[role] in plan.recipes[key].inputs.values() for key in others)
 
@@ -99,7 +103,7 @@ def test_alone_it_needs_no_skills(spec: Spec) -> None:
 def test_what_cannot_be_demonstrated_is_refused(spec: Spec) -> None:
     for task in ("", "microwave>microwave", "microwave>stove"):
         with pytest.raises(UsageError, match="is no task; join skills by '>'"):
-            replace(spec, single_policy=replace(spec.single_policy, task=task))
+            with_sections(spec, replace(section(spec, SinglePolicySettings), task=task))
     with pytest.raises(UsageError, match="these data of maze demonstrate no long task"):
         replace(load_spec("table1", "smoke"), methods=(METHOD,))
     people = replace(spec.data, source="human", human="D4RL/kitchen/complete-v2")

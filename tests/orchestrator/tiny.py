@@ -10,7 +10,7 @@ from unittest import mock
 from orchestrator.benchmarks.registry import BENCHMARKS
 from orchestrator.builders.models import load_models
 from orchestrator.executors.serial import SerialExecutor
-from orchestrator.reproduce import Settings, reproduce
+from orchestrator.reproduction import Settings, reproduce
 from orchestrator.spec.methods import (
     first_method,
     method_env,

@@ -1,5 +1,7 @@
 """A small maze with briefly trained models for the tests of playing; one thread, as in workers."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -24,6 +26,7 @@ from stitching.models.dynamics import Dynamics, DynamicsConfig, train_dynamics
 from stitching.models.initiation import Initiation
 from stitching.models.iql import IQLConfig, train_iql
 from stitching.planning.random_shooting import RandomShooting
+from tests.sections import with_sections
 
 torch.set_num_threads(1)
 
@@ -104,16 +107,14 @@ def stitchers(
         "initiation-sets": initiation,
     }
     models = Models(maze.actions, len(maze.skills), trained)
-    planning = {
-        "planner": "random-shooting",
-        "random_shooting": RandomShooting(population=30, horizon=4),
-    }
-    reach = ReachStitchSettings(limit=8, **planning)
+    planner = RandomShooting(population=30, horizon=4)
+    often = with_sections(MBStitchSettings(planner="random-shooting"), planner)
+    reach = with_sections(ReachStitchSettings(limit=8, planner="random-shooting"), planner)
     return {
         "no-stitch": NoStitch(),
         "random-stitch": RandomStitch(RandomStitchSettings(limit=5), models),
         "mf-stitch": MFStitch(MFStitchSettings(limit=5), models),
-        "mb-stitch": MBStitch(MBStitchSettings(execute=4, **planning), models),
-        "mb-stitch[execute=1]": MBStitch(MBStitchSettings(**planning), models),
+        "mb-stitch": MBStitch(replace(often, execute=4), models),
+        "mb-stitch[execute=1]": MBStitch(often, models),
         "reach-stitch": ReachStitch(reach, models),
     }

@@ -105,4 +105,4 @@ def test_a_setting_called_like_a_planner_is_refused() -> None:
     with pytest.raises(PartError, match="planner 'cem': Plans has another setting so called"):
 
         class Plans(PlannerChoice):
-            cem: int = 3  # type: ignore[assignment]
+            cem: int = 3

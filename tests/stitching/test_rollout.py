@@ -181,7 +181,7 @@ def test_a_whole_tree_gives_the_bytes_of_every_task(
     for length in (2, 1, 3):
         for prefix in permutations(reversed(names), length):
             tree.task(play_of(method, prefix), STEP_LIMIT)
-    reached = Counter()
+    reached: Counter[tuple[int, bool]] = Counter()
     for task in permutations(names, 3):
         block = play_of(method, task)
         alone = play_from_start(
@@ -223,7 +223,8 @@ def test_shorter_limits_can_be_read_off_the_longest(
         played = play_from_start(
             maze.vector_env(), agent, stitchers[method], maze, SAMPLED, block, step_limit
         )
-        episodes, used, found = np.array(block.episodes), np.zeros(12, dtype=np.int64), {}
+        episodes, used = np.array(block.episodes), np.zeros(12, dtype=np.int64)
+        found: dict[tuple[int, int], int] = {}
         for depth, segments in enumerate(played):
             used = (used + segments.steps)[segments.success]
             episodes = episodes[segments.success]
@@ -304,7 +305,7 @@ def segment(
     stitcher: Stitcher,
     config: RolloutConfig,
     block: Block,
-    budget: Sequence[int],
+    budget: Sequence[int] | np.ndarray,
     cells: np.ndarray,
 ) -> tuple[Segments, Log, np.ndarray]:
     env, log = maze.vector_env(), Log()
@@ -456,7 +457,7 @@ def test_nobody_plays(maze: Maze, agent: Agent, stitchers: dict[str, Stitcher]) 
 
 
 def test_the_mode_leaves_nothing_to_chance(maze: Maze, agent: Agent) -> None:
-    def paths(config: RolloutConfig) -> set[tuple]:
+    def paths(config: RolloutConfig) -> set[tuple[tuple[int, ...], ...]]:
         log = Log()
         play_from_start(
             maze.vector_env(), agent, NoStitch(), maze, config, play_of("no-stitch", ("c",)),
@@ -514,12 +515,13 @@ class PlannerRecorder:
 
     drawn: list[bytes]
     limit: int = 1
+    before_first: ClassVar[bool] = False
     until_value_falls: ClassVar[bool] = True
 
     def propose(
         self,
         states: Tensor,
-        previous: int,
+        previous: int | None,
         following: int,
         streams: Sequence[np.random.Generator],
     ) -> Proposal:
@@ -582,12 +584,13 @@ class Signposts:
     signs: dict[int, list[int]]
     limit: int
     asked: list[int] = field(default_factory=list)  # how many episodes, each time
-    until_value_falls: bool = True
+    before_first: ClassVar[bool] = False
+    until_value_falls: ClassVar[bool] = True
 
     def propose(
         self,
         states: Tensor,
-        previous: int,
+        previous: int | None,
         following: int,
         streams: Sequence[np.random.Generator],
     ) -> Proposal:
@@ -598,6 +601,12 @@ class Signposts:
         steps = len(next(iter(self.signs.values())))
         signs = [self.signs.get(row, [UP] * steps) for row in rows.tolist()]
         return Proposal(np.eye(4, dtype=np.float32)[signs], np.isin(rows, list(self.signs)))
+
+
+class SignpostsPastTheTop(Signposts):
+    """They are followed where the value falls, too."""
+
+    until_value_falls: ClassVar[bool] = False
 
 
 def on_the_floor(
@@ -667,7 +676,7 @@ def test_each_value_is_compared_with_the_last_not_the_first() -> None:
 def test_a_stitch_goes_on_where_the_value_falls_if_it_does_not_end_by_it() -> None:
     """North, where V rises, and south again and again, until the limit or where no sign is."""
     signs = {8: [UP], 7: [DOWN], 3: [DOWN], 4: [DOWN]}
-    stitcher = Signposts(signs, limit=6, until_value_falls=False)
+    stitcher = SignpostsPastTheTop(signs, limit=6)
     outcome, _ = on_the_floor(walker(v_row=[-1.0]), stitcher, [(8, 2), (3, 2)])
     assert outcome.stitch_steps.tolist() == [6, 2]
 

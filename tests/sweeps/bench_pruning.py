@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from orchestrator.reproduce import LazyExecutor
+from orchestrator.reproduction import LazyExecutor
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.work.progress import Silent
 from orchestrator.work.worker import use_one_thread

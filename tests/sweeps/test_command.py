@@ -265,6 +265,7 @@ def test_mlflow_shows_the_sweep_and_each_trial_once(done: Path) -> None:
         sweep_in(done, tiny_sweep(), tracking_uri=uri)
     client = MlflowClient(tracking_uri=uri)
     experiment = client.get_experiment_by_name("skillstitch/maze")
+    assert experiment is not None
     runs = client.search_runs([experiment.experiment_id])
     parents = [run for run in runs if "mlflow.parentRunId" not in run.data.tags]
     assert [run.info.run_name for run in parents] == ["sweep tiny-sweep paper"]

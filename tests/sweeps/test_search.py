@@ -14,7 +14,7 @@ from orchestrator.errors import UsageError
 from orchestrator.spec.spec import load_spec
 from sweeps.candidates import group, method_of
 from sweeps.search import rounds, search_spec
-from sweeps.space import Dimension
+from sweeps.space import Dimension, Fields
 from sweeps.spec import Confirm, Pruner, base_spec
 from sweeps.study import RESULT, SweepStudy
 from sweeps.winner import with_winner
@@ -59,7 +59,7 @@ def test_a_search_keeps_its_report(finished: Path) -> None:
 
 def test_every_block_is_played_once(trained: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     executor = Counted()
-    monkeypatch.setattr("orchestrator.reproduce.open_executor", lambda *_: executor)
+    monkeypatch.setattr("orchestrator.reproduction.open_executor", lambda *_: executor)
     sweep_in(trained, tiny_sweep())
     assert set(executor.played.values()) == {1}
     assert not executor.built
@@ -90,7 +90,7 @@ def test_a_trial_s_gain_is_that_of_the_same_run(finished: Path, tmp_path: Path) 
 
 def test_candidates_that_share_models_are_one_spec() -> None:
     base = base_spec(tiny_sweep())
-    fields = [{ALPHA: 1.0}, {ALPHA: 1}, {"agent.updates": 30, ALPHA: 1.0}, {}]
+    fields: list[Fields] = [{ALPHA: 1.0}, {ALPHA: 1}, {"agent.updates": 30, ALPHA: 1.0}, {}]
     first, second = group(fields, base, "test")
     assert first.spec.methods == ("no-stitch", "mb-stitch[alpha=1]", "mb-stitch")
     assert first.methods == {0: "mb-stitch[alpha=1]", 1: "mb-stitch[alpha=1]", 3: "mb-stitch"}

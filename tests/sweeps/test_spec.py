@@ -12,6 +12,7 @@ from orchestrator.errors import UsageError
 from orchestrator.spec.spec import TableSpec, load_spec
 from orchestrator.spec.tomls import Scale
 from orchestrator.storage.claim import describe
+from stitching.methods.mb_stitch import MBStitchSettings
 from sweeps.results.table import table_spec
 from sweeps.space import Dimension, replaced
 from sweeps.spec import (
@@ -22,6 +23,7 @@ from sweeps.spec import (
     packaged_sweeps,
     split_tasks,
 )
+from tests.sections import section
 from tests.sweeps.tiny import tiny_sweep
 
 ALPHA = "mb_stitch.alpha"
@@ -155,7 +157,8 @@ def test_methods_take_settings_of_their_planner() -> None:
     """What makes a trial a method: dots lead into fields of fields."""
     spec = load_spec("table2")
     own = replaced(spec, {"mb_stitch.cem.horizon": 3, "mb_stitch.alpha": 2}, "")
-    assert spec.method_settings("mb-stitch[alpha=2,cem.horizon=3]") == own.mb_stitch
+    settings = spec.method_settings("mb-stitch[alpha=2,cem.horizon=3]")
+    assert settings == section(own, MBStitchSettings)
     with pytest.raises(UsageError, match="unknown field 'horizons'"):
         spec.method_settings("mb-stitch[cem.horizons=3]")
 

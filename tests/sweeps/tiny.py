@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-from orchestrator.reproduce import Settings
+from orchestrator.reproduction import Settings
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.work.progress import Silent
 from sweeps.spec import SweepSpec, load_sweep

@@ -16,19 +16,21 @@ WALL = "#BFC4CA"
 
 
 def draw_showcase(showcase: Mapping[str, Any], labels: Mapping[str, str]) -> Figure:
-    """Left the demonstrated skills, then one panel for each episode given."""
-    episodes = showcase["episodes"]
+    """Left the demonstrated skills, where there are any, then a panel for each episode given."""
+    episodes, demonstrations = showcase["episodes"], showcase["demonstrations"]
     colours = dict(zip(showcase["goals"], COLOURS, strict=False))
-    figure = new_figure(3.1 * (1 + len(episodes)), 3.9)
-    panels = figure.subplots(1, 1 + len(episodes), squeeze=False)[0]
+    count = len(episodes) + bool(demonstrations)
+    figure = new_figure(max(5.5, 3.1 * count), 3.9)
+    panels = figure.subplots(1, count, squeeze=False)[0]
     for axes in panels:
         _draw_map(axes, showcase, colours)
 
-    panels[0].set_title("Skills")
-    for skill, paths in showcase["demonstrations"].items():
+    if demonstrations:
+        panels[0].set_title("Skills")
+    for skill, paths in demonstrations.items():
         for path in paths:
             _draw_path(panels[0], path, colours[skill], "-", _lane(skill, colours))
-    for axes, episode in zip(panels[1:], episodes, strict=True):
+    for axes, episode in zip(panels[-len(episodes) :], episodes, strict=True):
         _draw_episode(axes, episode, colours)
         method = labels.get(episode["method"], episode["method"])
         skills = episode["task"].split(">")
@@ -42,8 +44,19 @@ def draw_showcase(showcase: Mapping[str, Any], labels: Mapping[str, str]) -> Fig
         Line2D([], [], color=INK, marker="s", ls="none", label="start"),
         Line2D([], [], color=INK, marker="X", ls="none", label="end of the episode"),
     ]
-    figure.legend(handles=keys, loc="outside lower center", ncols=len(keys), columnspacing=1.2)
+    columns = len(keys) if count > 2 else 4
+    figure.legend(handles=keys, loc="outside lower center", ncols=columns, columnspacing=1.2)
     return figure
+
+
+def draw_path_so_far(
+    axes: Axes, showcase: Mapping[str, Any], episode: Mapping[str, Any], steps: int
+) -> None:
+    """An episode after so many steps."""
+    colours = dict(zip(showcase["goals"], COLOURS, strict=False))
+    _draw_map(axes, showcase, colours)
+    taken = {name: episode[name][:steps] for name in ("phases", "skills")}
+    _draw_episode(axes, taken | {"positions": episode["positions"][: steps + 1]}, colours)
 
 
 def _draw_map(axes: Axes, showcase: Mapping[str, Any], colours: Mapping[str, str]) -> None:

@@ -5,13 +5,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from analysis.figures.drawn import DRAWING, PHOTOGRAPH, Drawn
 from analysis.figures.showcase.frames import render_frames
 from analysis.figures.showcase.maze import draw_showcase
 from analysis.figures.showcase.physics import draw_sheet, draw_values, segment_labels, sheet_steps
 from analysis.figures.showcase.scenes import VIEWS, NoPictureError, scene_of
-from analysis.figures.style import save
+from analysis.figures.style import house_style, save
 from analysis.run import Run
 from analysis.schema import RunSpec
 
@@ -73,17 +74,34 @@ def _physics(shown: _Shown, folder: Path) -> list[Drawn]:
 
 def _contact_sheet(shown: _Shown, folder: Path) -> Drawn:
     showcase, episode = shown.showcase, shown.showcase["episodes"][-1]
-    steps = sheet_steps(episode)
     try:
-        scene = scene_of(showcase, episode)
-        frames = render_frames(scene, np.array(episode["positions"])[steps])
+        sheet = _sheet(showcase, shown.spec)
     except NoPictureError as error:
         return shown.drawn("contact-sheet", "", f"no contact sheet: {error}")
-    sheet = draw_sheet(episode, steps, frames, segment_labels(showcase, shown.spec))
     save(sheet, folder, shown.name("contact-sheet"), PHOTOGRAPH)
     method = shown.spec.methods.get(episode["method"], episode["method"])
     caption = f"{SHEET_CAPTION.format(method=method)} {VIEWS[showcase['benchmark']].note}"
     return shown.drawn("contact-sheet", caption.strip(), formats=PHOTOGRAPH)
+
+
+def _sheet(showcase: dict[str, Any], spec: RunSpec) -> Figure:
+    """The last episode's contact sheet."""
+    episode = showcase["episodes"][-1]
+    steps = sheet_steps(episode)
+    frames = render_frames(scene_of(showcase, episode), np.array(episode["positions"])[steps])
+    return draw_sheet(episode, steps, frames, segment_labels(showcase, spec))
+
+
+def _path(showcase: dict[str, Any], spec: RunSpec) -> Figure:
+    """The last episode's path on the map."""
+    last = {"demonstrations": {}, "episodes": showcase["episodes"][-1:]}
+    return draw_showcase(showcase | last, spec.methods)
+
+
+def write_picture(showcase: dict[str, Any], spec: RunSpec, path: Path) -> None:
+    """The last episode in one PNG: a contact sheet, or its path. NoPictureError as frames do."""
+    with house_style():
+        save(PICTURES[showcase["kind"]](showcase, spec), path.parent, path.stem, ("png",))
 
 
 def _which_episode(shown: _Shown) -> str:
@@ -104,3 +122,6 @@ def _which_episode(shown: _Shown) -> str:
 
 SHOWCASES = {"map": _map, "physics": _physics}
 """How a kind of recording is drawn."""
+
+PICTURES = {"map": _path, "physics": _sheet}
+"""How an episode of it is drawn in one picture."""

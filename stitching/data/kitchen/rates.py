@@ -2,7 +2,7 @@
 
     python -m stitching.data.kitchen.rates --attempts 50
 
-The issue asks for 90 % from the start pose and 75 % from the ends met in the orders.
+Wanted are 90 % from the start pose and 75 % from the ends met in the orders.
 """
 
 from __future__ import annotations

@@ -17,22 +17,33 @@ DEMONSTRATIONS = 10  # paths shown of each skill
 
 @dataclass
 class PathRecorder:
-    """Follows the one episode through its cells."""
+    """Follows every episode through its cells."""
 
     maze: Maze
-    positions: list[list[int]] = field(default_factory=list)
-    phases: list[str] = field(default_factory=list)
-    skills: list[str] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        self.positions.append(list(self.maze.spawn))
+    episodes: dict[int, dict[str, Any]] = field(default_factory=dict)  # by number
 
     def step(
         self, env: VectorEnv, rows: np.ndarray, episodes: np.ndarray, skill: int, phase: str
     ) -> None:
-        self.positions.append([int(x) for x in env.snapshot(rows)[0]])
-        self.phases.append(phase)
-        self.skills.append(self.maze.skills[skill].name)
+        for number, snapshot in zip(episodes.tolist(), env.snapshot(rows), strict=True):
+            episode = self.episode(number)
+            episode["positions"].append([int(x) for x in snapshot])
+            episode["phases"].append(phase)
+            episode["skills"].append(self.maze.skills[skill].name)
+
+    def scene(self) -> dict[str, Any]:
+        """What all episodes have in common, as JSON."""
+        return {
+            "kind": "map",
+            "layout": list(self.maze.layout),
+            "spawn": list(self.maze.spawn),
+            "goals": {name: list(cell) for name, cell in self.maze.goals},
+        }
+
+    def episode(self, number: int) -> dict[str, Any]:
+        """What was recorded of an episode, step by step, as JSON."""
+        start = list(self.maze.spawn)
+        return self.episodes.setdefault(number, {"positions": [start], "phases": [], "skills": []})
 
 
 def maze_showcase(maze: Maze, demonstrations: Transitions, shown: Shown) -> dict[str, Any]:
@@ -45,17 +56,11 @@ def maze_showcase(maze: Maze, demonstrations: Transitions, shown: Shown) -> dict
             {
                 "method": method,
                 "task": ">".join(shown.task),
-                "positions": recorder.positions,
-                "phases": recorder.phases,
-                "skills": recorder.skills,
+                **recorder.episode(0),
                 "accomplished": int(sum(s.success.sum() for s in segments)),
             }
         )
-    return {
-        "kind": "map",
-        "layout": list(maze.layout),
-        "spawn": list(maze.spawn),
-        "goals": {name: list(cell) for name, cell in maze.goals},
+    return PathRecorder(maze).scene() | {
         "demonstrations": {
             name: [
                 _path(maze, demonstrations, rows)

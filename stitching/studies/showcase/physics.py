@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import dataclass, field
 from typing import Any, Protocol, cast
 
@@ -9,6 +10,7 @@ import numpy as np
 import torch
 
 from stitching.envs.protocol import Benchmark, VectorEnv
+from stitching.models.agent import Agent
 from stitching.planning.objective import spread_over_members
 from stitching.rollout import Segments
 from stitching.studies.showcase.scenery import SCENERIES, Scenery
@@ -24,23 +26,37 @@ class PhysicsVectorEnv(VectorEnv, Protocol):
         """MuJoCo's generalised positions (n, nq): what a renderer needs."""
 
 
+def _nothing_yet() -> dict[str, Any]:
+    return {name: [] for name in ("positions", "skill", "phase", "value", "spread")}
+
+
 @dataclass
 class StepRecorder:
     """Follows every episode: where all things are, and what its skill's value is."""
 
     benchmark: Benchmark
-    shown: Shown
-    scenery: Scenery | None
-    episodes: list[dict[str, Any]] = field(init=False)
+    agent: Agent
+    episodes: dict[int, dict[str, Any]] = field(
+        init=False, default_factory=lambda: defaultdict(_nothing_yet)
+    )  # by number
 
-    def __post_init__(self) -> None:
-        names = ("positions", "skill", "phase", "value", "spread")
-        self.episodes = [{name: [] for name in names} for _ in range(EPISODES)]
+    @property
+    def scenery(self) -> Scenery | None:
+        return SCENERIES.get(self.benchmark.name)
+
+    def scene(self) -> dict[str, Any]:
+        """What all episodes have in common, as JSON."""
+        model = {"model": self.scenery.model()} if self.scenery else {}
+        return {"kind": "physics", "benchmark": self.benchmark.name} | model
+
+    def episode(self, number: int) -> dict[str, Any]:
+        """What was recorded of an episode, step by step, as JSON."""
+        return self.episodes[number]
 
     def step(
         self, env: VectorEnv, rows: np.ndarray, episodes: np.ndarray, skill: int, phase: str
     ) -> None:
-        values = self.shown.agent.values(torch.from_numpy(env.observe(rows)), skill)
+        values = self.agent.values(torch.from_numpy(env.observe(rows)), skill)
         spread = spread_over_members(values)
         positions = cast(PhysicsVectorEnv, env).positions(rows)
         told = zip(rows, episodes, positions, values.mean(dim=0), spread, strict=True)
@@ -62,20 +78,19 @@ def physics_showcase(benchmark: Benchmark, shown: Shown) -> dict[str, Any]:
     if there is none, the first of those in which it accomplishes most. Figures say so. The
     benchmark's environments are `PhysicsVectorEnv`s.
     """
-    scenery = SCENERIES.get(benchmark.name)
     played = {}
     for method in shown.stitchers:
-        recorder = StepRecorder(benchmark, shown, scenery)
+        recorder = StepRecorder(benchmark, shown.agent)
         segments = shown.play(benchmark, method, EPISODES, recorder)
-        for episode, numbers in zip(recorder.episodes, _segment_numbers(segments), strict=True):
-            episode["segment"] = numbers
-        played[method] = recorder.episodes, _accomplished(segments)
+        episodes = [
+            recorder.episode(episode) | {"segment": numbers}
+            for episode, numbers in enumerate(_segment_numbers(segments))
+        ]
+        played[method] = episodes, _accomplished(segments)
     scores = [accomplished for _, accomplished in played.values()]
     better = np.flatnonzero(scores[-1] > scores[0])
     number = int(better[0]) if len(better) else int(scores[-1].argmax())
-    return {
-        "kind": "physics",
-        "benchmark": benchmark.name,
+    return recorder.scene() | {
         "task": ">".join(shown.task),
         "episode": number,
         "of_episodes": EPISODES,
@@ -84,7 +99,6 @@ def physics_showcase(benchmark: Benchmark, shown: Shown) -> dict[str, Any]:
             {"method": method, "accomplished": int(accomplished[number]), **episodes[number]}
             for method, (episodes, accomplished) in played.items()
         ],
-        **({"model": scenery.model()} if scenery else {}),
     }
 
 

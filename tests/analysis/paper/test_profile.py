@@ -10,6 +10,7 @@ import pytest
 from analysis.paper.implied import MEAN, bounds, skills
 from analysis.paper.profile import COLUMNS, profile
 from analysis.schema import RunError, RunSpec
+from tests.rows import row
 
 SKILLS = tuple(skills())
 MICROWAVE, KETTLE = "microwave", "kettle"
@@ -62,9 +63,9 @@ def test_rates_are_of_all_episodes(segments: pd.DataFrame, method: str) -> None:
     assert list(table.columns) == COLUMNS
     assert len(table) == 2 * (len(SKILLS) + 1)
     rows = by_skill(table)
-    assert rows.loc[("first", MICROWAVE), ["successes", "n", "rate"]].tolist() == [6, 8, 0.75]
+    assert row(rows, "first", MICROWAVE)[["successes", "n", "rate"]].tolist() == [6, 8, 0.75]
     assert rows.loc[("first", MEAN), "rate"] == pytest.approx(0.75 / 7)
-    kettle = rows.loc[("second", KETTLE)]
+    kettle = row(rows, "second", KETTLE)
     assert kettle[["successes", "n"]].tolist() == [4, 48]
     assert kettle["rate"] == pytest.approx(0.5 / 6)  # and not 2/3, as once the first succeeded
     assert rows.loc[("second", MEAN), "rate"] == pytest.approx(0.5 / 42)
@@ -88,14 +89,14 @@ def test_where_tasks_are_missing_the_bounds_are_of_something_else(segments: pd.D
     rows = by_skill(profile(segments, few, "no-stitch"))
     assert rows.loc[("second", KETTLE), "rate"] == 0.5
     assert rows["implied_low"].notna().tolist() == [True, True, False, False, False, False]
-    assert pd.isna(rows.loc[("second", KETTLE), "inside"])
+    assert pd.isna(row(rows, "second", KETTLE)["inside"])
 
 
 def test_what_was_given_up_is_left_out(segments: pd.DataFrame) -> None:
     lost = {"seed": 1, "method": "no-stitch", "prefix": f"{MICROWAVE}>{KETTLE}",
             "episodes": [0, 1, 2, 3], "error": ""}  # fmt: skip
     rows = by_skill(profile(segments, SPEC, "no-stitch", [lost]))
-    assert rows.loc[("second", KETTLE), ["successes", "n"]].tolist() == [2, 44]
+    assert row(rows, "second", KETTLE)[["successes", "n"]].tolist() == [2, 44]
 
 
 def test_a_method_that_table_8_has_not(segments: pd.DataFrame) -> None:

@@ -11,6 +11,7 @@ from analysis.report import build_report
 from analysis.run import load_run
 from analysis.studies.forecast import COLUMNS, agreement, agreement_text, forecast_table
 from tests.analysis.kitchen_run import kitchen_files, write_kitchen
+from tests.rows import row
 
 
 def table(forecasts: list[float], successes: list[int], trials: int = 10) -> pd.DataFrame:
@@ -24,7 +25,7 @@ def table(forecasts: list[float], successes: list[int], trials: int = 10) -> pd.
 def test_counts_are_no_stitchs_over_all_seeds(tmp_path: Path, write_run: Any) -> None:
     found = forecast_table(load_run(write_kitchen(write_run, tmp_path / "run")))
     rows = found.set_index(["first", "second"])
-    assert rows.loc[("microwave", "kettle"), ["successes", "trials"]].tolist() == [4, 8]
+    assert row(rows, "microwave", "kettle")[["successes", "trials"]].tolist() == [4, 8]
     assert rows.loc[("kettle", "microwave"), "rate"] == 0
 
 

@@ -7,6 +7,7 @@ import pytest
 from analysis.run import load_run
 from analysis.studies.models import auc, model_table
 from tests.analysis.kitchen_run import SKILLS, kitchen_segments, write_kitchen
+from tests.rows import row
 
 
 def brute_force(values: np.ndarray, success: np.ndarray, seeds: np.ndarray) -> float:
@@ -39,7 +40,7 @@ def test_all_models_are_in_the_table(tmp_path: Path, write_run: Any) -> None:
     table = model_table(run).set_index(["measure", "of"])
     assert table.loc["competence"].index.tolist() == SKILLS
     assert table.loc[("competence", "kettle"), "value"] == pytest.approx(0.97)
-    assert table.loc[("from start pose", "kettle"), ["successes", "trials"]].tolist() == [8, 8]
+    assert row(table, "from start pose", "kettle")[["successes", "trials"]].tolist() == [8, 8]
     assert table.loc[("value rank correlation", "kettle"), "trials"] == 3
     assert table.loc[("relative error after 5", "arm positions"), "value"] == 0.2
     assert table.loc[("disagreement rank correlation after 1", "all"), "value"] == 0.7
@@ -48,4 +49,4 @@ def test_all_models_are_in_the_table(tmp_path: Path, write_run: Any) -> None:
     assert table.loc[("after other skills", "kettle"), "successes"] == plain["success"].sum()
     expected = brute_force(*(plain[name].to_numpy() for name in ("value_start", "success", "seed")))
     assert table.loc[("auc", "kettle"), "value"] == pytest.approx(expected)
-    assert np.isnan(table.loc[("auc", "microwave"), "value"])  # it never succeeds second
+    assert np.isnan(row(table, "auc", "microwave")["value"])  # it never succeeds second

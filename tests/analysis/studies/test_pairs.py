@@ -16,6 +16,7 @@ from analysis.studies.pairs import (
     shown_pairs,
 )
 from tests.analysis.kitchen_run import kitchen_spec
+from tests.rows import row
 
 ORDERS = [["microwave", "kettle", "light switch"]]
 
@@ -92,9 +93,9 @@ def test_groups_weigh_every_pair_the_same(
 ) -> None:
     groups = pair_groups(seconds, both, ORDERS, kitchen).set_index(["group", "method"])
     counts = groups[["pairs", "successes", "trials"]]
-    assert counts.loc[(IN_DATA, "no-stitch")].tolist() == [1, 3, 4]
-    assert counts.loc[(OTHER, "mb-stitch")].tolist() == [1, 1, 2]
-    assert counts.loc[(ALL, "no-stitch")].tolist() == [2, 4, 6]
+    assert row(counts, IN_DATA, "no-stitch").tolist() == [1, 3, 4]
+    assert row(counts, OTHER, "mb-stitch").tolist() == [1, 1, 2]
+    assert row(counts, ALL, "no-stitch").tolist() == [2, 4, 6]
     assert groups.loc[(ALL, "no-stitch"), "rate"] == pytest.approx((0.75 + 0.5) / 2)
     assert groups.loc[(IN_DATA, "mb-stitch"), "gain"] == pytest.approx(0.25)
     assert groups.loc[(ALL, "mb-stitch"), "gain"] == pytest.approx(0.125)
@@ -118,7 +119,7 @@ def test_what_first_skills_of_its_own_are_worth(segments: pd.DataFrame, kitchen:
     kitchen = replace(kitchen, own_first_skill=frozenset({"mb-stitch"}))
     seconds, both = second_skills(segments, kitchen), both_skills(segments, kitchen)
     groups = pair_groups(seconds, both, ORDERS, kitchen).set_index(["group", "method"])
-    others = groups.loc[(OTHER, "mb-stitch")]
+    others = row(groups, OTHER, "mb-stitch")
     assert (others["successes"], others["trials"], others["gain"]) == (3, 4, 0)
     assert (others["both"], others["both_gain"]) == (0.75, 0.5)
 

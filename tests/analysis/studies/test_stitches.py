@@ -19,6 +19,7 @@ from analysis.studies.stitches import (
     stitch_table,
 )
 from tests.analysis.kitchen_run import kitchen_first_skills, kitchen_stitches, write_kitchen
+from tests.rows import row
 
 
 @pytest.fixture(params=["alone", "merged"])
@@ -88,7 +89,7 @@ def test_first_skills_and_hand_overs_are_told_apart(tmp_path: Path, write_run: A
     table = outcome_table(run).set_index("kind")
     assert table["stitches"].to_dict() == {FIRST_SKILLS: 2, HAND_OVERS: 3}
     assert table["hurt"].to_dict() == {FIRST_SKILLS: 2, HAND_OVERS: 1}
-    assert np.isnan(table.loc[FIRST_SKILLS, "auc_value_spread"])  # all of them hurt
+    assert np.isnan(row(table, FIRST_SKILLS)["auc_value_spread"])  # all of them hurt
     assert table.loc[HAND_OVERS, "auc_value_spread"] == 1
     html = section(run)
     assert "1 first skill and 1 pair, 5 episodes of each" in html

@@ -12,7 +12,7 @@ NODE = {"num_cpus": 1, "object_store_memory": 200 * 2**20, "include_dashboard": 
 
 def main() -> None:
     cluster = Cluster(initialize_head=True, head_node_args=dict(NODE))
-    second = cluster.add_node(**NODE)
+    second = cluster.add_node(wait=True, **NODE)
     cluster.wait_for_nodes()
     print(cluster.address, flush=True)
     if sys.stdin.readline():

@@ -14,6 +14,8 @@ from orchestrator.spec.structure import to_plain
 from orchestrator.spec.suite import Suite, load_asked
 from orchestrator.spec.tomls import Scale, packaged_specs
 from stitching.methods.mb_stitch import MBStitchSettings
+from stitching.planning.random_shooting import RandomShooting
+from tests.sections import section, with_sections
 
 
 @pytest.mark.parametrize("name", packaged_specs())
@@ -33,8 +35,9 @@ def test_table1_is_the_papers_protocol() -> None:
     assert (spec.episodes, spec.seeds, len(spec.methods)) == (100, 3, 4)
     assert spec.step_limits == {2: 50, 3: 50, 4: 50}
     assert (spec.agent.learning_rate, spec.agent.dropout, spec.agent.expectile) == (3e-4, 0.1, 0.7)
-    shooting = spec.mb_stitch.random_shooting
-    assert (shooting.population, shooting.horizon, spec.mb_stitch.execute) == (200, 5, 5)
+    settings = section(spec, MBStitchSettings)
+    shooting = section(settings, RandomShooting)
+    assert (shooting.population, shooting.horizon, settings.execute) == (200, 5, 5)
 
 
 def test_table1s_standard_scale_is_the_papers() -> None:
@@ -176,7 +179,8 @@ def test_methods_take_settings() -> None:
     settings = spec.method_settings("mb-stitch[alpha=1,beta=2.5,norm=max]")
     assert isinstance(settings, MBStitchSettings)
     assert (settings.alpha, settings.beta, settings.norm) == (1.0, 2.5, "max")
-    assert settings.random_shooting == spec.mb_stitch.random_shooting
+    usual = section(spec, MBStitchSettings)
+    assert section(settings, RandomShooting) == section(usual, RandomShooting)
     assert method_label("mb-stitch[alpha=1,beta=2.5]") == "MB-Stitch [alpha=1,beta=2.5]"
 
 
@@ -200,6 +204,8 @@ def test_an_unknown_method_or_setting_lists_what_there_is(method: str, message: 
 
 def test_differences_name_the_fields() -> None:
     spec = load_spec("table1")
-    changed = replace(spec, seeds=4, mb_stitch=replace(spec.mb_stitch, alpha=3.0))
+    changed = with_sections(
+        replace(spec, seeds=4), replace(section(spec, MBStitchSettings), alpha=3.0)
+    )
     assert differences(spec, changed) == ["mb_stitch.alpha: 20.0 → 3.0", "seeds: 3 → 4"]
     assert differences(spec, spec) == []

@@ -12,10 +12,10 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.errors import ChangedError, IncompleteError, LockedError, UsageError
-from orchestrator.reproduce_suite import reproduce_suite
 from orchestrator.spec.spec import TableSpec
-from orchestrator.spec.structure import to_plain
+from orchestrator.spec.structure import Plain, to_plain
 from orchestrator.spec.suite import Suite, load_asked
+from orchestrator.spec.tomls import Scale
 from orchestrator.storage.merge import (
     Naming,
     describe_suite,
@@ -25,6 +25,7 @@ from orchestrator.storage.merge import (
     stitches_of_part,
 )
 from orchestrator.storage.rundir import RunDirectory
+from orchestrator.suite_reproduction import reproduce_suite
 from orchestrator.work import playing
 from orchestrator.work.progress import Silent
 from tests.orchestrator.tiny import TINY, promised_bytes, serially
@@ -70,7 +71,8 @@ def test_a_part_may_have_settings_of_its_own_at_a_scale(tmp_path: Path) -> None:
     scales = "scales = { smoke = { data = { episodes = 3 } } }"
     asked = "settings = { data = { episodes = 6 } }"
     file.write_text(content.replace(asked, f"{asked}\n{scales}"))
-    for scale, episodes in (("smoke", 3), ("paper", 6)):
+    expected: dict[Scale, int] = {"smoke": 3, "paper": 6}
+    for scale, episodes in expected.items():
         suite = load_asked(str(file), scale)
         assert isinstance(suite, Suite)
         assert to_plain(suite.parts[0].spec.data)["episodes"] == episodes
@@ -143,13 +145,13 @@ def test_again_does_nothing(done: Path) -> None:
     carry_out(levels(), done)  # a copy: its store is another
     files = [file for file in (done / "out").rglob("*.*") if "ledger" not in file.name]
     before = {file: file.stat().st_mtime_ns for file in files}
-    with mock.patch("orchestrator.reproduce.open_executor", side_effect=AssertionError):
+    with mock.patch("orchestrator.reproduction.open_executor", side_effect=AssertionError):
         carry_out(levels(), done)
     assert {file: file.stat().st_mtime_ns for file in files} == before
 
 
 def test_stopped_between_parts(finished: Path, tmp_path: Path) -> None:
-    import orchestrator.reproduce_suite as carrying
+    import orchestrator.suite_reproduction as carrying
 
     reproduce, calls = carrying.reproduce, []
 
@@ -253,7 +255,7 @@ def test_every_part_is_shown_under_the_names_of_the_whole(done: Path, tmp_path: 
     assert list(shown) == ["level-1", "level-2"]
     methods = [episode["method"] for episode in shown["level-2"]["episodes"]]
     assert methods == ["no-stitch@level-2", "mb-stitch@level-2"]
-    physical = {
+    physical: Plain = {
         "task": "g0>g1",
         "accomplished_by_all": {"mb-stitch": [2]},
         "episodes": [{"method": "mb-stitch", "skill": ["g0", "g1"]}],

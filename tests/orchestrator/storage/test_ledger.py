@@ -1,4 +1,4 @@
-"""The record of finished blocks: append-only, honest about damage, safe when killed or full."""
+"""The record of finished blocks: honest about damage, safe when killed or full."""
 
 import hashlib
 import re

@@ -17,8 +17,10 @@ from orchestrator.errors import ChangedError, LockedError, StorageError, UsageEr
 from orchestrator.spec.spec import Spec
 from orchestrator.storage.claim import claim_for_spec, describe, spec_of
 from orchestrator.storage.rundir import RunDirectory, default_out
+from stitching.methods.mb_stitch import MBStitchSettings
 from stitching.rollout import RolloutConfig
 from tests.orchestrator.tiny import Place
+from tests.sections import section, with_sections
 
 
 @pytest.fixture
@@ -105,8 +107,9 @@ def test_a_kill_while_settling(directory: RunDirectory, spec: Spec) -> None:
 
 
 def test_another_spec_is_refused_with_the_difference(done: Place, spec: Spec) -> None:
-    changed = replace(
-        spec, episodes=7, mb_stitch=replace(spec.mb_stitch, alpha=3.0), tasks=("g0>g1",)
+    changed = with_sections(
+        replace(spec, episodes=7, tasks=("g0>g1",)),
+        replace(section(spec, MBStitchSettings), alpha=3.0),
     )
     with pytest.raises(ChangedError) as caught:
         done.carry_out(changed)

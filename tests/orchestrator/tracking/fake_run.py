@@ -125,6 +125,7 @@ class Seen:
 
         self.client = MlflowClient(tracking_uri=uri)
         experiment = self.client.get_experiment_by_name("skillstitch/maze")
+        assert experiment is not None
         self.experiment = experiment.experiment_id
         runs = [
             run

@@ -41,6 +41,7 @@ def test_a_finished_run_is_shown_whole(run_dir: Path, uri: str) -> None:
         "table1/2 goals/mb-stitch alpha 2.5 over no-stitch/gain",
     } <= parent.metrics.keys()
 
+    assert seen.parent.inputs is not None
     (dataset,) = seen.parent.inputs.dataset_inputs
     assert dataset.dataset.name == "demonstrations"
     artifacts = {file.path for file in seen.client.list_artifacts(seen.parent.info.run_id)}

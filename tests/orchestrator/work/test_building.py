@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestrator import reproduce as reproducing
+from orchestrator import reproduction as reproducing
 from orchestrator.errors import BadDataError, ChangedError, IncompleteError
 from orchestrator.executors.serial import SerialExecutor
 from orchestrator.spec.spec import Spec

@@ -1,8 +1,9 @@
 """The rollout tree on the serial executor: who plays, what is tried again, what is given up."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -13,7 +14,10 @@ from orchestrator.work import playing
 from orchestrator.work.evaluation import Evaluation
 from orchestrator.work.jobs import ATTEMPTS, Job, PlayJob, Report
 from orchestrator.work.plan import Node, Plan
-from stitching.rollout import Block
+from stitching.envs.protocol import Benchmark, VectorEnv
+from stitching.methods.protocol import Stitcher
+from stitching.models.agent import Agent
+from stitching.rollout import Block, Recorder, RolloutConfig, Segments
 from tests.orchestrator.tiny import Counted, Lines, Place, promised_bytes
 
 
@@ -43,19 +47,27 @@ Break = Callable[..., None]
 
 
 @pytest.fixture
-def break_blocks(monkeypatch: pytest.MonkeyPatch) -> Break:
+def break_blocks(monkeypatch: pytest.MonkeyPatch) -> Iterator[Break]:
     """Make blocks raise while they are played: those a condition holds for, so many times."""
     play_segment = playing.play_segment
 
     def break_blocks(broken: Callable[[Block], bool], times: int = 10**9) -> None:
         left = Counter[Block]()
 
-        def faulty(block: object, agent: object, stitcher: object, *rest: object) -> object:
-            play = next(item for item in rest if isinstance(item, Block))
+        def faulty(
+            env: VectorEnv,
+            agent: Agent,
+            stitcher: Stitcher,
+            benchmark: Benchmark,
+            config: RolloutConfig,
+            play: Block,
+            budget: np.ndarray,
+            recorder: Recorder | None,
+        ) -> Segments:
             left[play] += 1
             if broken(play) and left[play] <= times:
                 raise RuntimeError("the simulator fell over")
-            return play_segment(block, agent, stitcher, *rest)
+            return play_segment(env, agent, stitcher, benchmark, config, play, budget, recorder)
 
         monkeypatch.setattr(playing, "play_segment", faulty)
 

@@ -3,7 +3,7 @@
 import importlib.util
 from dataclasses import replace
 from itertools import permutations
-from typing import get_args
+from typing import TypedDict, get_args
 
 import pytest
 
@@ -19,7 +19,9 @@ from orchestrator.work.recipes import _closure
 from stitching.data.mixtures import Mixture
 from stitching.envs.kitchen import KITCHEN
 from stitching.envs.maze import MAZE
+from stitching.methods.mb_stitch import MBStitchSettings
 from stitching.rollout import RolloutConfig
+from tests.sections import section, with_sections
 
 
 @pytest.fixture(scope="module")
@@ -113,7 +115,7 @@ def test_plans_are_the_same_every_time(plan: Plan, spec: Spec) -> None:
 def test_alpha_touches_first_skills_only_where_they_are_stitched_to(spec: Spec) -> None:
     spec = replace(spec, rollout=FIRST)
     plan = make_plan(spec)
-    other = make_plan(replace(spec, mb_stitch=replace(spec.mb_stitch, alpha=5.0)))
+    other = make_plan(with_sections(spec, replace(section(spec, MBStitchSettings), alpha=5.0)))
     touched = changed(plan, other)
     assert touched == {node for node in plan.nodes if node.method == "mb-stitch"}
     assert {node.prefix for node in touched if not node.parent} == {
@@ -122,7 +124,7 @@ def test_alpha_touches_first_skills_only_where_they_are_stitched_to(spec: Spec) 
 
 
 def test_alpha_touches_only_mb_stitch_after_the_first_skill(plan: Plan, spec: Spec) -> None:
-    other = make_plan(replace(spec, mb_stitch=replace(spec.mb_stitch, alpha=5.0)))
+    other = make_plan(with_sections(spec, replace(section(spec, MBStitchSettings), alpha=5.0)))
     assert changed(plan, other) == {node for node in plan.nodes if node.method == "mb-stitch"}
     differing = set(plan.recipes) - set(other.recipes)
     assert {plan.recipes[key].kind for key in differing} == {"maze-showcase"}
@@ -240,8 +242,13 @@ def test_initiation_sets_are_of_the_data_alone(spec: Spec) -> None:
     assert not make_plan(spec).by_seed("initiation-sets")
 
 
+class Altered(TypedDict, total=False):
+    swap: float
+    corrections: float
+
+
 @pytest.mark.parametrize("setting", [{"swap": 0.8}, {"corrections": 1.5}], ids=str)
-def test_what_belongs_together_names_an_agent_that_alters_it(setting: dict[str, float]) -> None:
+def test_what_belongs_together_names_an_agent_that_alters_it(setting: Altered) -> None:
     kitchen = load_spec("table2", "smoke")
     altered = make_plan(replace(kitchen, agent=replace(kitchen.agent, **setting)))
     agent = altered.recipes[altered.by_seed("agent")[0]]

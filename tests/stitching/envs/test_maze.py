@@ -80,7 +80,8 @@ def test_a_goal_holds_in_its_cell_alone() -> None:
 
 
 def test_a_skill_is_told_by_its_goal() -> None:
-    np.testing.assert_array_equal(conditions(SMALL), np.float32([[1 / 5, 3 / 5], [3 / 5, 2 / 5]]))
+    expected = np.array([[1 / 5, 3 / 5], [3 / 5, 2 / 5]], dtype=np.float32)
+    np.testing.assert_array_equal(conditions(SMALL), expected)
     assert [skill.name for skill in SMALL.skills] == ["corner", "end"]
 
 

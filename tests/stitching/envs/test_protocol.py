@@ -47,4 +47,4 @@ def test_conditions_are_the_skills_own_in_their_order() -> None:
     stacked = conditions(MAZE)
     assert stacked.dtype == np.float32
     for skill, row in zip(MAZE.skills, stacked, strict=True):
-        np.testing.assert_array_equal(row, np.float32(skill.condition))
+        np.testing.assert_array_equal(row, np.array(skill.condition, dtype=np.float32))

@@ -119,7 +119,8 @@ def test_what_is_seen_is_theirs(steps: list[Step]) -> None:
     for step in steps:
         if step.gap < TOLERANCE:
             # Its relative quaternions are of single precision.
-            np.testing.assert_allclose(*step.observation, atol=1e-5)
+            ours, original = step.observation
+            np.testing.assert_allclose(ours, original, atol=1e-5)
 
 
 def test_success_is_theirs_and_is_reached(steps: list[Step]) -> None:

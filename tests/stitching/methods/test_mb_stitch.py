@@ -1,6 +1,6 @@
 """MB-Stitch: Eq. 2 along imagined paths in float64, and what comes of it."""
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import product
 from typing import Any
@@ -19,13 +19,16 @@ from stitching.planning.cem import CEM
 from stitching.planning.objective import Norm, Price, conservative_value
 from stitching.planning.random_shooting import RandomShooting
 from stitching.streams import stream
+from tests.sections import with_sections
 from tests.stitching.methods.linear import ARM, MOVES, linear_agent, streams
 
 # MB-Stitch against Eq. 2, one action sequence and one member at a time.
 
 OBSERVATION, VALUES, MODELS = 3, 4, 5
 CONDITIONS = np.array([[1.0, 0.0], [0.2, 0.8]], dtype=np.float32)
-REDUCE = {"mean": np.mean, "l2": np.linalg.norm, "max": np.max}
+REDUCE: dict[Norm, Callable[[list[np.floating]], np.floating]] = {
+    "mean": np.mean, "l2": np.linalg.norm, "max": np.max,
+}
 
 
 def random_models(actions: ActionSpace) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
@@ -51,7 +54,7 @@ def equation_2(
     agent: dict[str, np.ndarray],
     model: dict[str, np.ndarray],
     state: np.ndarray,
-    actions: Sequence[np.ndarray],
+    actions: np.ndarray,
     skill: int,
     stitcher: MBStitch,
 ) -> float:
@@ -77,13 +80,9 @@ def equation_2(
     return np.mean(values) - one.alpha * np.std(values) - one.beta * disagreement
 
 
-SETTINGS = MBStitchSettings(
-    limit=5,
-    execute=2,
-    alpha=2.0,
-    beta=3.0,
-    planner="random-shooting",
-    random_shooting=RandomShooting(population=300, horizon=2),
+SETTINGS = with_sections(
+    MBStitchSettings(limit=5, execute=2, alpha=2.0, beta=3.0, planner="random-shooting"),
+    RandomShooting(population=300, horizon=2),
 )
 
 
@@ -191,7 +190,7 @@ def line_stitcher(
         "dynamics": Dynamics(model, DynamicsConfig()),
     }
     planner = CEM(population=60, elites=10, horizon=1, iterations=100)
-    usual = MBStitchSettings(limit=5, alpha=0.0, beta=0.0, cem=planner)
+    usual = with_sections(MBStitchSettings(limit=5, alpha=0.0, beta=0.0), planner)
     return MBStitch(replace(usual, **settings), Models(ARM, 1, trained))
 
 
@@ -212,7 +211,9 @@ SURE = [[1.0, 0.0], [0.0, 1.0]]
     ids=["value alone", "α = 0", "α = 5", "β = 5", "β = 0"],
 )
 def test_doubt_steers_the_plan(
-    values: list, steps: list, settings: dict[str, float], moves: tuple[float, float]
+    values: list[list[float]],
+    steps: list[list[list[float]]],
+    settings: dict[str, float], moves: tuple[float, float]
 ) -> None:
     stitcher = line_stitcher(values, steps, **settings)
     proposed = stitcher.propose(torch.zeros(3, 2), 0, 0, streams(3)).actions
@@ -231,7 +232,7 @@ def test_doubt_steers_the_plan(
     ids=["rises", "flat", "α = 1", "α = 3"],
 )
 def test_a_selective_stitch_wants_plans_that_beat_the_present(
-    values: list, settings: dict[str, float], wanted: bool
+    values: list[list[float]], settings: dict[str, float], wanted: bool
 ) -> None:
     always = line_stitcher(values, [SURE, SURE], **settings)
     selective = line_stitcher(values, [SURE, SURE], selective=True, **settings)

@@ -26,6 +26,6 @@ def test_random_stitch_fills_the_box() -> None:
     assert actions.shape == (2000, 1, 2)
     assert np.abs(actions).max() <= 1
     np.testing.assert_allclose(
-        np.quantile(actions[:, 0], [0.25, 0.5, 0.75], axis=0), [[-0.5] * 2, [0] * 2, [0.5] * 2],
+        np.quantile(actions[:, 0], [0.25, 0.5, 0.75], axis=0), [[-0.5] * 2, [0.0] * 2, [0.5] * 2],
         atol=0.08,
     )  # fmt: skip

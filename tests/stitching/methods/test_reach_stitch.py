@@ -114,8 +114,8 @@ def test_a_plan_is_judged_by_all_of_its_steps() -> None:
         gaps = [np.linalg.norm(poses - place, axis=-1) for place in ([0.0, 0.0], [3.0, 0.0])]
         spread = paths.std(axis=0).mean(axis=-1)  # (steps,)
         expected.append((-np.minimum(*gaps).mean(axis=0) - 0.7 * spread).mean())
-    tensors = (torch.tensor(each, dtype=torch.float32) for each in (starts, sequences))
-    found = reach(SURE, other, beta=0.7)._imagine(*tensors, following=0)
+    begun, planned = (torch.tensor(each, dtype=torch.float32) for each in (starts, sequences))
+    found = reach(SURE, other, beta=0.7)._imagine(begun, planned, following=0)
     np.testing.assert_allclose(found.numpy(), expected, atol=1e-5)
 
 

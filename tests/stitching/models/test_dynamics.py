@@ -1,5 +1,6 @@
 """The dynamics ensemble: it learns the maze, and doubts what it has not seen."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from stitching.data.maze import MazeDataConfig, exploration
 from stitching.data.transitions import Transitions
 from stitching.envs.maze import MAZE, MOVES
 from stitching.models.dynamics import Dynamics, DynamicsConfig, train_dynamics
-from stitching.models.layers import Precision, init_mlp, prefixed
+from stitching.models.layers import Activation, Precision, init_mlp, prefixed
 from stitching.models.scale import observation_scale
 from stitching.streams import stream
 
@@ -95,8 +96,10 @@ def random_weights(activation_sizes: list[int], observation: int) -> dict[str, n
 
 
 @pytest.mark.parametrize("activation", ["relu", "elu", "sigmoid"])
-def test_a_prediction_is_the_state_plus_each_members_own_change(activation: str) -> None:
-    activations = {
+def test_a_prediction_is_the_state_plus_each_members_own_change(
+    activation: Activation,
+) -> None:
+    activations: dict[Activation, Callable[[np.ndarray], np.ndarray]] = {
         "relu": lambda x: np.maximum(x, 0),
         "elu": lambda x: np.where(x > 0, x, np.exp(np.minimum(x, 0)) - 1),
         "sigmoid": lambda x: 1 / (1 + np.exp(-x)),
@@ -143,13 +146,13 @@ def test_training_is_a_plain_regression() -> None:
     rng = stream("batches", "x")
     index = np.stack([rng.integers(200, size=(3, 32)) for _ in range(config.updates)])
     for member in range(3):
+        layers = [torch.nn.Linear(10, 16), torch.nn.Linear(16, 16), torch.nn.Linear(16, 6)]
         net = torch.nn.Sequential(
-            torch.nn.Linear(10, 16), torch.nn.ReLU(), torch.nn.Linear(16, 16), torch.nn.ReLU(),
-            torch.nn.Linear(16, 6),
-        ).double()  # fmt: skip
-        for layer in range(3):
-            net[2 * layer].weight.data = torch.from_numpy(start[f"t.w{layer}"][member].T).double()
-            net[2 * layer].bias.data = torch.from_numpy(start[f"t.b{layer}"][member, 0]).double()
+            layers[0], torch.nn.ReLU(), layers[1], torch.nn.ReLU(), layers[2]
+        ).double()
+        for number, layer in enumerate(layers):
+            layer.weight.data = torch.from_numpy(start[f"t.w{number}"][member].T).double()
+            layer.bias.data = torch.from_numpy(start[f"t.b{number}"][member, 0]).double()
         optimizer = torch.optim.Adam(net.parameters(), lr=config.learning_rate)
         schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimizer, config.updates)
         for update in range(config.updates):
@@ -159,11 +162,11 @@ def test_training_is_a_plain_regression() -> None:
             loss.backward()
             optimizer.step()
             schedule.step()
-        for layer in range(3):
+        for number, layer in enumerate(layers):
             np.testing.assert_allclose(
-                trained[f"t.w{layer}"][member], net[2 * layer].weight.T.detach(), atol=1e-4
+                trained[f"t.w{number}"][member], layer.weight.T.detach(), atol=1e-4
             )
-            assert np.abs(trained[f"t.w{layer}"] - start[f"t.w{layer}"]).max() > 5e-3
+            assert np.abs(trained[f"t.w{number}"] - start[f"t.w{number}"]).max() > 5e-3
 
 
 def test_units_of_measurement_do_not_matter() -> None:

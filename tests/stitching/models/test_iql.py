@@ -197,11 +197,12 @@ def test_dropout_is_for_the_policy_alone() -> None:
 @pytest.mark.parametrize("level", [0.1, 0.5, 0.7, 0.99])
 def test_the_minimiser_of_the_expectile_loss_is_the_expectile(level: float) -> None:
     sample = np.random.default_rng(0).exponential(size=200)
-    minimum = scipy_expectile(sample, level)
+    minimum = float(scipy_expectile(sample, level))
 
     def slope(at: float) -> float:
         m = torch.tensor(at, dtype=torch.float64, requires_grad=True)
         expectile_loss(torch.from_numpy(sample) - m, level).mean().backward()
+        assert m.grad is not None
         return m.grad.item()
 
     assert slope(minimum) == pytest.approx(0, abs=1e-6)
@@ -235,7 +236,7 @@ def module(weights: dict[str, np.ndarray], prefix: str, member: int) -> nn.Seque
     layers: list[nn.Module] = []
     for layer in range(CONFIG.hidden_layers + 1):
         w = torch.from_numpy(weights[f"{prefix}.w{layer}"][member]).double()
-        linear = nn.Linear(*w.shape, dtype=torch.float64)
+        linear = nn.Linear(w.shape[0], w.shape[1], dtype=torch.float64)
         linear.weight.data = w.T.clone()
         linear.bias.data = torch.from_numpy(weights[f"{prefix}.b{layer}"][member, 0]).double()
         layers += [linear, nn.ReLU()]
@@ -298,11 +299,12 @@ class PlainIQL:
 
     def weights(self) -> dict[str, list[Tensor]]:
         groups = {"q": self.q, "v": self.v, "policy": [self.policy]}
-        named = {"policy.log_std": [self.log_std]}
+        named: dict[str, list[Tensor]] = {"policy.log_std": [self.log_std]}
         for prefix, nets in groups.items():
-            for layer in range(CONFIG.hidden_layers + 1):
-                named[f"{prefix}.w{layer}"] = [net[2 * layer].weight.T for net in nets]
-                named[f"{prefix}.b{layer}"] = [net[2 * layer].bias[None] for net in nets]
+            members = [[layer for layer in net if isinstance(layer, nn.Linear)] for net in nets]
+            for number, layers in enumerate(zip(*members, strict=True)):
+                named[f"{prefix}.w{number}"] = [layer.weight.T for layer in layers]
+                named[f"{prefix}.b{number}"] = [layer.bias[None] for layer in layers]
         return named
 
 

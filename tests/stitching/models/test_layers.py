@@ -1,6 +1,7 @@
 """Stacked perceptrons against one plain float64 perceptron at a time; dropout; initial weights."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.stats import kstest
 
 from stitching.models.layers import (
+    Activation,
     Params,
     at_precision,
     init_mlp,
@@ -19,14 +21,14 @@ from stitching.models.layers import (
 )
 from stitching.streams import stream
 
-PLAIN = {
+PLAIN: dict[Activation, Callable[[np.ndarray], np.ndarray]] = {
     "relu": lambda x: np.maximum(x, 0),
     "elu": lambda x: np.where(x > 0, x, np.expm1(np.minimum(x, 0))),
     "sigmoid": lambda x: 1 / (1 + np.exp(-x)),
 }
 
 
-def plain_mlp(params: Params, member: int, row: np.ndarray, activation: str) -> np.ndarray:
+def plain_mlp(params: Params, member: int, row: np.ndarray, activation: Activation) -> np.ndarray:
     """One member on one input."""
     layers = len(params) // 2
     for layer in range(layers):
@@ -38,7 +40,7 @@ def plain_mlp(params: Params, member: int, row: np.ndarray, activation: str) -> 
     return row
 
 
-def plain_outputs(params: Params, inputs: torch.Tensor, activation: str) -> np.ndarray:
+def plain_outputs(params: Params, inputs: torch.Tensor, activation: Activation) -> np.ndarray:
     """(members, n, in) → (members, n, out)"""
     return np.array(
         [
@@ -61,7 +63,7 @@ def normal(*shape: int, seed: int = 0) -> torch.Tensor:
     seed=st.integers(0, 99),
 )
 def test_each_member_is_a_plain_perceptron(
-    members: int, sizes: list[int], rows: int, activation: str, seed: int
+    members: int, sizes: list[int], rows: int, activation: Activation, seed: int
 ) -> None:
     params = init_mlp(members, sizes, stream(seed))
     inputs = normal(members, rows, sizes[0], seed=seed)
@@ -107,7 +109,7 @@ def test_no_dropout_unless_asked_for() -> None:
 def units(width: int, hidden_layers: int = 1) -> Params:
     """Hidden units that all hold the input, and outputs that show each of them."""
     first = {"w0": torch.ones(1, 1, width), "b0": torch.zeros(1, 1, width)}
-    later = {}
+    later: Params = {}
     for layer in range(1, hidden_layers + 1):
         later |= {f"w{layer}": torch.eye(width)[None], f"b{layer}": torch.zeros(1, 1, width)}
     return first | later

@@ -37,8 +37,7 @@ def test_sequences_are_judged_from_their_own_problems_state(actions: ActionSpace
 def test_distinct_pairs_are_found_again(copies: int) -> None:
     rng = stream("distinct")
     starts = torch.from_numpy(np.repeat(rng.integers(2, size=(30, 3)), copies, axis=0)).float()
-    sequences = np.repeat(MOVES.uniform(rng, (30, 2)), copies, axis=0)
-    sequences = torch.from_numpy(sequences)
+    sequences = torch.from_numpy(np.repeat(MOVES.uniform(rng, (30, 2)), copies, axis=0))
     own_starts, own_sequences, inverse = distinct(starts, sequences)
     assert torch.equal(own_starts[inverse], starts)
     assert torch.equal(own_sequences[inverse], sequences)

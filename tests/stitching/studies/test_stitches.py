@@ -17,6 +17,7 @@ from stitching.planning.objective import spread_over_members
 from stitching.planning.random_shooting import RandomShooting
 from stitching.rollout import Block, RolloutConfig, play_from_start
 from stitching.studies.stitches import START, StudiedMethod, study_stitches
+from tests.sections import with_sections
 
 EPISODES = 8
 PAIRS = [("b", "a"), ("b", "d"), ("d", "b")]
@@ -113,10 +114,8 @@ def test_plans_are_written_down_as_eq_2_sees_them(
 ) -> None:
     """With plans of one action the objective is made of the very terms that are written down."""
     planner = RandomShooting(population=30, horizon=1)
-    settings = replace(
-        studied.stitcher.settings, random_shooting=planner, alpha=2.0, beta=3.0, execute=1
-    )
-    stitcher = replace(studied.stitcher, settings=settings)
+    settings = replace(studied.stitcher.settings, alpha=2.0, beta=3.0, execute=1)
+    stitcher = replace(studied.stitcher, settings=with_sections(settings, planner))
     short = study_stitches(replace(studied, stitcher=stitcher), demonstrations, PAIRS[:1], EPISODES)
     plans = [plan for stitch in short["stitches"] for plan in stitch["plans"]]
     assert plans

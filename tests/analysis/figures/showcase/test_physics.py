@@ -1,4 +1,5 @@
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +45,7 @@ def spec() -> RunSpec:
     return RunSpec.from_dict(kitchen_spec())
 
 
-def drawn(scene: dict[str, Any], positions: list[list[float]]) -> np.ndarray:
+def drawn(scene: dict[str, Any], positions: Sequence[Sequence[float] | np.ndarray]) -> np.ndarray:
     try:
         return render_frames(scene, np.array(positions))
     except NoPictureError as error:

@@ -9,7 +9,7 @@ from dataclasses import replace
 from analysis.report import build_report
 from orchestrator.errors import IncompleteError, SkillstitchError
 from orchestrator.executors import open_executor
-from orchestrator.reproduce import Settings, partial_error, reproduce, tracked
+from orchestrator.reproduction import Settings, partial_error, reproduce, tracked
 from orchestrator.spec.spec import Spec
 from orchestrator.spec.suite import Suite, suite_differences, suite_of
 from orchestrator.storage import locking

@@ -2,6 +2,7 @@
 
 import shutil
 import threading
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -10,9 +11,10 @@ import pytest
 from orchestrator.spec.spec import Spec
 from orchestrator.storage import locking
 from orchestrator.storage.ledger import Ledger
-from orchestrator.storage.store import Store
+from orchestrator.storage.store import Artifact, Store
 from orchestrator.work.plan import Plan
 from tests.orchestrator.tiny import Counted, Lines, Place, carry_out, promised_bytes, serially
+from tests.rows import row
 
 
 class KilledError(Exception):
@@ -46,7 +48,7 @@ def test_the_showcase_shows_what_was_evaluated(done: Place) -> None:
         skills, phases = np.array(shown["skills"]), np.array(shown["phases"])
         task = shown["task"].split(">")
         for depth, skill in enumerate(task[: shown["accomplished"] + 1], start=1):
-            played = first.loc[shown["method"] if depth > 1 else "", ">".join(task[:depth])]
+            played = row(first, shown["method"] if depth > 1 else "", ">".join(task[:depth]))
             assert played.steps == (skills == skill).sum()
             assert played.stitch_steps == (phases[skills == skill] == "stitch").sum()
             assert played.success == (depth <= shown["accomplished"])
@@ -118,11 +120,13 @@ def test_resumes_where_training_ended(
     write = Store.write
     written: list[str] = []
 
-    def dying(self: Store, kind: str, key: str, *rest: object) -> str:
+    def dying(
+        self: Store, kind: str, key: str, artifact: Artifact, made: dict[str, Any]
+    ) -> str:
         if len(written) == k:
             raise KilledError
         written.append(key)
-        return write(self, kind, key, *rest)
+        return write(self, kind, key, artifact, made)
 
     monkeypatch.setattr(Store, "write", dying)
     with pytest.raises(KilledError):
