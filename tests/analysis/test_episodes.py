@@ -183,9 +183,8 @@ def test_a_method_may_have_first_skills_of_its_own(segments: Any, spec: RunSpec)
 
 def test_until_they_are_played_such_a_method_has_no_episodes(segments: Any, spec: RunSpec) -> None:
     """It must not borrow the shared first skills."""
-    episodes = episodes_from_segments(
-        segments.query("method != 'no-stitch'"), replace(spec, own_first_skill=frozenset({"no-stitch"}))
-    )
+    own = replace(spec, own_first_skill=frozenset({"no-stitch"}))
+    episodes = episodes_from_segments(segments.query("method != 'no-stitch'"), own)
     assert "no-stitch" not in set(episodes["method"])
 
 

@@ -535,7 +535,8 @@ def test_gc_keeps_everything_where_a_name_is_wrong(cli: Cli, done: Place) -> Non
 
 @pytest.mark.slow
 def test_the_installed_command(place: Place, expected: dict[str, bytes]) -> None:
-    command = [Path(sys.executable).with_name("skillstitch"), "run", TINY, "--executor", "serial"]
+    skillstitch = Path(sys.executable).with_name("skillstitch")
+    command: list[str | Path] = [skillstitch, "run", TINY, "--executor", "serial"]
     paths: list[str | Path] = ["--out", place.out, "--store", place.store_root]
     for _ in range(2):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)

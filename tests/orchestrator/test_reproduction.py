@@ -120,9 +120,7 @@ def test_resumes_where_training_ended(
     write = Store.write
     written: list[str] = []
 
-    def dying(
-        self: Store, kind: str, key: str, artifact: Artifact, made: dict[str, Any]
-    ) -> str:
+    def dying(self: Store, kind: str, key: str, artifact: Artifact, made: dict[str, Any]) -> str:
         if len(written) == k:
             raise KilledError
         written.append(key)

@@ -80,8 +80,11 @@ def a_robot_that_obeys() -> Transitions:
 def test_each_way_of_altering_the_data_reaches_the_agent() -> None:
     data = a_robot_that_obeys()
 
-    def agent(swap: float = 0.0, corrections: float = 0.0) -> dict[str, np.ndarray]:
-        config = replace(SKILLS, clip=True, swap=swap, corrections=corrections)
+    def agent(
+        swap: float = 0.0, corrections: float = 0.0, multi_task: bool = True
+    ) -> dict[str, np.ndarray]:
+        usual = replace(SKILLS, clip=True, multi_task=multi_task)
+        config = replace(usual, swap=swap, corrections=corrections)
         recipe = {"benchmark": "kitchen", "root_seed": 0, "seed": 0, "config": to_plain(config)}
         recipe["factors"] = to_plain(KITCHEN.factors)
         return dict(BUILDERS["agent"].make(recipe, {"demonstrations": as_artifact(data)}).arrays)

@@ -64,7 +64,7 @@ def _physics(
         axes.set_axis_off()
         value, spread = episode["value"][step], episode["spread"][step]
         told = f"step {step + 1}: {labels[numbers[step]]}, value {value:.2f} ± {spread:.2f}"
-        _caption(figure, _title(episode, spec), told, episode["phase"][step])
+        _caption(figure, _title(showcase, spec), told, episode["phase"][step])
         yield _pixels(figure)
 
 
@@ -77,7 +77,7 @@ def _map(
         draw_path_so_far(axes, showcase, episode, step)
         phase = episode["phases"][step - 1] if step else ""
         told = f"step {step}: {spec.skill_label(episode['skills'][step - 1])}" if step else "start"
-        _caption(figure, _title(episode, spec), told, phase)
+        _caption(figure, _title(showcase, spec), told, phase)
         yield _pixels(figure)
 
 
@@ -85,9 +85,9 @@ FRAMES = {"physics": _physics, "map": _map}
 """How a kind of recording is drawn, step by step."""
 
 
-def _title(episode: Mapping[str, Any], spec: RunSpec) -> str:
-    method = spec.methods.get(episode["method"], episode["method"])
-    return f"{method}: {spec.task_label(episode['task'])}"
+def _title(showcase: Mapping[str, Any], spec: RunSpec) -> str:
+    method = showcase["episodes"][-1]["method"]
+    return f"{spec.methods.get(method, method)}: {spec.task_label(showcase['task'])}"
 
 
 def _caption(figure: Figure, title: str, told: str, phase: str) -> None:

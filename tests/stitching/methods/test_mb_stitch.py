@@ -27,7 +27,9 @@ from tests.stitching.methods.linear import ARM, MOVES, linear_agent, streams
 OBSERVATION, VALUES, MODELS = 3, 4, 5
 CONDITIONS = np.array([[1.0, 0.0], [0.2, 0.8]], dtype=np.float32)
 REDUCE: dict[Norm, Callable[[list[np.floating]], np.floating]] = {
-    "mean": np.mean, "l2": np.linalg.norm, "max": np.max,
+    "mean": np.mean,
+    "l2": np.linalg.norm,
+    "max": np.max,
 }
 
 
@@ -213,7 +215,8 @@ SURE = [[1.0, 0.0], [0.0, 1.0]]
 def test_doubt_steers_the_plan(
     values: list[list[float]],
     steps: list[list[list[float]]],
-    settings: dict[str, float], moves: tuple[float, float]
+    settings: dict[str, float],
+    moves: tuple[float, float],
 ) -> None:
     stitcher = line_stitcher(values, steps, **settings)
     proposed = stitcher.propose(torch.zeros(3, 2), 0, 0, streams(3)).actions
