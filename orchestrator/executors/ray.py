@@ -91,13 +91,13 @@ class RayExecutor:
 
     def submit(self, job: Job) -> None:
         if isinstance(job, BuildJob):
-            self._release_seats()
+            self._release_slots()
             roles = list(job.recipe.inputs)
             inputs = [self._references[key] for key in job.recipe.inputs.values()]
             self._flights[_build.remote(job, roles, *inputs)] = _Flight(job)
         else:
             self._waiting.append(job)
-            self._seat_waiting()
+            self._assign_waiting()
 
     def next(self) -> Report:
         reference = self._first_ready()
@@ -110,7 +110,7 @@ class RayExecutor:
             if slot is not None:
                 slot.jobs -= 1
                 slot.started = True
-        self._seat_waiting()
+        self._assign_waiting()
         return report
 
     def close(self) -> None:
@@ -136,7 +136,7 @@ class RayExecutor:
         surplus = max(0, len(self._slots) - self.workers)
         for slot in [slot for slot in self._slots if not slot.started][:surplus]:
             self._waiting.extendleft(reversed(self._dismiss(slot)))
-        self._seat_waiting()
+        self._assign_waiting()
 
     def _lose(self, reference: Any) -> Job:
         """The job whose worker died. What waited behind it is innocent and goes to another."""
@@ -163,7 +163,7 @@ class RayExecutor:
         cores = max(1, int(ray.cluster_resources().get("CPU", 1)))
         return min(cores, self._most_workers or cores)
 
-    def _seat_waiting(self) -> None:
+    def _assign_waiting(self) -> None:
         """Hand waiting jobs to the least busy actors, hiring actors up to the number of workers."""
         while self._waiting:
             if len(self._slots) < self.workers:
@@ -177,7 +177,7 @@ class RayExecutor:
             slot.jobs += 1
             self._flights[slot.actor.play.remote(job, references)] = _Flight(job, slot)
 
-    def _release_seats(self) -> None:
+    def _release_slots(self) -> None:
         """Actors hold a core each; give them back so that training tasks can use them."""
         for slot in [slot for slot in self._slots if not slot.jobs]:
             self._dismiss(slot)

@@ -27,6 +27,9 @@ from stitching.streams import Label
 FORMAT = 1
 """Of the files: those of another one count as none."""
 
+NEWS = ".news"
+"""Ends the name of a file that tells how far a training is."""
+
 PLAIN = "plain"
 """The tensor whose bytes are JSON: all that is no tensor."""
 
@@ -78,6 +81,13 @@ class CheckpointFile:
         with suppress(OSError, StorageError):
             write_atomically(self.path, _digest(data) + data)
 
+    def tell(self, done: int, updates: int, losses: dict[str, float]) -> None:
+        """Beside the checkpoint; where the disk refuses, nobody is told."""
+        news = {"done": done, "updates": updates, "losses": losses}
+        with suppress(OSError):
+            self.path.parent.mkdir(exist_ok=True)
+            self.path.with_name(f"{self.path.name}{NEWS}").write_text(json.dumps(news))
+
     def read(self) -> tuple[dict[str, torch.Tensor], dict[str, Any]] | None:
         try:
             content = self.path.read_bytes()
@@ -93,6 +103,28 @@ class CheckpointFile:
             return None
         self.build.earlier = max(self.build.earlier, kept["seconds"])
         return tensors, kept["plain"]
+
+
+@dataclass(frozen=True)
+class News:
+    """How far the trainings of an artifact are."""
+
+    done: int  # updates, of all its trainings that have begun
+    updates: int
+    losses: dict[str, float]  # recorded last, of the one that is under way
+
+
+def news_of(folder: Path) -> News | None:
+    """What the trainings that keep checkpoints in a folder tell; None where they tell nothing."""
+    told = []
+    for file in sorted(folder.glob(f"*{NEWS}")):
+        with suppress(OSError, ValueError):  # it is being written, or is gone
+            told.append((file.stat().st_mtime, json.loads(file.read_text())))
+    if not told:
+        return None
+    _, newest = max(told, key=lambda news: news[0])
+    done, updates = (sum(news[name] for _, news in told) for name in ("done", "updates"))
+    return News(done, updates, newest["losses"])
 
 
 def _digest(data: bytes) -> bytes:

@@ -48,9 +48,10 @@ class Evaluation:
                 self._expand(root, chunk)
         if self._ready:
             self._provide_models()
-        while self._ready or self._in_flight:
-            self._dispatch()
-            self._receive(self.executor.next())
+        with self.progress.watching(lambda: f"{self._in_flight} jobs under way"):
+            while self._ready or self._in_flight:
+                self._dispatch()
+                self._receive(self.executor.next())
 
     def _adopt(self) -> None:
         """Take over blocks that an earlier run over this store has finished."""

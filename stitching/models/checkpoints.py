@@ -21,6 +21,9 @@ class Checkpoint(Protocol):
     def write(self, tensors: dict[str, torch.Tensor], plain: dict[str, Any]) -> None:
         """Replace what was kept; arrays in `plain` may come back as lists."""
 
+    def tell(self, done: int, updates: int, losses: dict[str, float]) -> None:
+        """How far the training is, for a person who waits; nothing depends on it."""
+
     def read(self) -> tuple[dict[str, torch.Tensor], dict[str, Any]] | None:
         """What was written last; None where there is nothing, or nothing whole."""
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.tracking import default_uri, pending, prepare, publish, stores
+from orchestrator.tracking import default_uri, publish, stores
 from tests.orchestrator.tracking.fake_run import Seen, finish_run, rewind, start_run, train_run
 
 
@@ -27,7 +27,7 @@ def test_a_server_that_is_down_is_said_in_one_line(run_dir: Path) -> None:
     assert "\n" not in outcome.error
     assert f"127.0.0.1:{port}" in outcome.error
     assert "secret" not in outcome.error + (run_dir / "tracking.json").read_text()
-    assert pending(run_dir, uri)
+    assert not publish(run_dir, uri, finished=True).skipped
 
 
 @contextmanager
@@ -57,9 +57,10 @@ def test_a_locked_database_is_said_and_made_up_for_later(
         assert time.monotonic() - start < 5
         assert not outcome.ok
         assert "locked" in outcome.error
-        assert pending(run_dir, uri)
-    assert publish(run_dir, uri, finished=True).ok
-    assert not pending(run_dir, uri)
+    made_up_for = publish(run_dir, uri, finished=True)
+    assert made_up_for.ok
+    assert not made_up_for.skipped
+    assert publish(run_dir, uri, finished=True).skipped
 
 
 @pytest.mark.parametrize(("name", "ok"), [("seed#1 a", True), ("50%23", False), ("why?", False)])
@@ -81,7 +82,6 @@ def test_a_store_that_cannot_be_is_no_reason_to_stop(run_dir: Path, uri: str) ->
     outcome = publish(run_dir, uri, finished=True)
     assert not outcome.ok
     assert outcome.error
-    assert not prepare(uri).ok or uri.startswith("nonsense")
 
 
 def test_a_deleted_experiment_is_named(run_dir: Path, uri: str) -> None:
@@ -113,10 +113,11 @@ def test_runs_that_publish_to_one_new_store_at_the_same_time(tmp_path: Path) -> 
         assert Seen(uri, run_id=name).states() == ("FINISHED", {"FINISHED"})
 
 
-def test_a_schema_that_a_background_thread_creates(run_dir: Path, tmp_path: Path) -> None:
+def test_a_schema_that_another_thread_creates(run_dir: Path, tmp_path: Path) -> None:
     (tmp_path / "mlflow.db.new").write_bytes(b"what a kill left of an earlier attempt")
     uri = default_uri(tmp_path)
-    thread = threading.Thread(target=prepare, args=(uri,))
+    other = finish_run(train_run(start_run(tmp_path / "other", run_id="other")))
+    thread = threading.Thread(target=publish, args=(other, uri), kwargs={"finished": True})
     thread.start()
     assert publish(run_dir, uri, finished=True).ok
     thread.join()

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.tracking import PublishOutcome, pending, publish, writing
+from orchestrator.tracking import PublishOutcome, publish, writing
 from orchestrator.tracking.views import METHOD, RUN_ID, SEED
 from orchestrator.tracking.writing import CONTENT
 from tests.orchestrator.tracking.fake_run import (
@@ -107,8 +107,9 @@ def test_a_publish_that_breaks_off_is_completed_by_the_next(
     with pytest.raises(KeyboardInterrupt):
         publish(run_dir, uri, finished=True)
     monkeypatch.undo()
-    assert pending(run_dir, uri)
-    assert publish(run_dir, uri, finished=True).ok
+    outcome = publish(run_dir, uri, finished=True)
+    assert outcome.ok
+    assert not outcome.skipped
     seen = Seen(uri)
     assert seen.states() == ("FINISHED", {"FINISHED"})
     assert seen.count == rows(uri, "runs") == 1 + CHILDREN
