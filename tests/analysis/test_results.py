@@ -4,8 +4,10 @@ import json
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
 
+from analysis import open_run
 from analysis.report import export_results
 from analysis.results import SCALES, Extent, check_results, extent_of, provenance_text
 from analysis.schema import RunError
@@ -67,6 +69,14 @@ def test_a_folder_that_takes_nothing_is_found_before_anything_runs(tmp_path: Pat
         check_results(tmp_path / ("a" * 300), ["table1"], EXTENT, force=False)
     check_results(tmp_path / "not" / "yet", ["table1"], EXTENT, force=False)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "link"]
+
+
+def test_an_export_is_read_like_the_run(tmp_path: Path, write_run: Any) -> None:
+    run_dir = write_run(tmp_path / "run", training=None, showcase=None)
+    (folder,) = export_results(run_dir, tmp_path / "results")
+    ours, kept_ones = open_run(run_dir), open_run(folder)
+    pd.testing.assert_frame_equal(kept_ones.episodes, ours.episodes)
+    pd.testing.assert_frame_equal(kept_ones.scores("table1"), ours.scores("table1"))
 
 
 def test_an_export_says_its_extent_and_keeps_to_it(tmp_path: Path, write_run: Any) -> None:
