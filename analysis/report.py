@@ -15,6 +15,7 @@ from analysis.paper.profile import profiles
 from analysis.results import check_results, provenance_text
 from analysis.run import Run, load_run
 from analysis.schema import PROVENANCE, SEGMENTS, SPEC
+from analysis.studies.data import undemonstrated, undemonstrated_note
 from analysis.studies.forecast import forecast_table
 from analysis.studies.models import model_table
 from analysis.studies.pairs import both_skills, pair_groups, pair_table, second_skills, shown_orders
@@ -95,7 +96,9 @@ def _build(run_dir: Path) -> tuple[list[Table], Studies, list[Drawn]]:
         drawn = draw_figures(run, tables, report / "figures", studies.get("forecast"))
         for table in tables:
             name = table.entry.id
-            _write(report / f"{name}.md", to_markdown(table) + _markdown_rates(studies))
+            left_out = undemonstrated_note(undemonstrated(run))
+            beside = f"\n**{left_out}**\n" if left_out else ""
+            _write(report / f"{name}.md", to_markdown(table) + beside + _markdown_rates(studies))
             _write(report / f"{name}.tex", to_latex(table))
             _write(report / f"{name}.csv", to_csv(table.scores))
             _write(report / f"{name}-gains.csv", to_csv(table.gains))

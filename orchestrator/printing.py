@@ -6,10 +6,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from analysis.studies.data import undemonstrated_note
 from orchestrator.cores import usable_cores
 from orchestrator.spec.methods import method_label
 from orchestrator.spec.spec import Spec
 from orchestrator.spec.suite import Suite
+from orchestrator.storage.datasets import undemonstrated_skills
 from orchestrator.storage.ledger import Ledger
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.storage.store import CorruptArtifactError, Store
@@ -70,6 +72,14 @@ def forecast_lines(plan: Plan, store: Store) -> Iterator[str]:
         rates = [forecast.get((first, second)) for second in skills]
         cells = [f"{'' if rate is None else f'{rate:.2f}':>{width}}" for rate in rates]
         yield f"  {first:<{width}}  " + "  ".join(cells)
+
+
+def data_lines(plan: Plan, store: Store) -> Iterator[str]:
+    """What the datasets leave out, where the store has them all."""
+    if not all((plan.recipes[key].kind, key) in store for key in plan.datasets.values()):
+        return
+    if note := undemonstrated_note(undemonstrated_skills(plan, store)):
+        yield note
 
 
 def _time_line(costs: list[CostEstimate], workers: int | None) -> str:

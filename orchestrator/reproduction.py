@@ -11,6 +11,7 @@ from pathlib import Path
 from analysis.episodes import write_episodes
 from analysis.report import build_report
 from analysis.schema import PROVENANCE, QUARANTINE
+from analysis.studies.data import undemonstrated_note
 from orchestrator import tracking
 from orchestrator.cores import check_workers, usable_cores
 from orchestrator.errors import (
@@ -25,6 +26,7 @@ from orchestrator.spec.spec import Spec
 from orchestrator.spec.structure import Plain
 from orchestrator.storage import locking
 from orchestrator.storage.claim import claim_for_spec
+from orchestrator.storage.datasets import undemonstrated_skills
 from orchestrator.storage.exports import write_readable
 from orchestrator.storage.ledger import Ledger
 from orchestrator.storage.provenance import provenance
@@ -200,6 +202,8 @@ def _work(
         builds = Builds(plan, store, ledger, executor, progress)
         busy_training = builds.run(plan.needed, present)
         watch.lap("training")
+        if note := undemonstrated_note(undemonstrated_skills(plan, store)):
+            progress.say(note)
         evaluation = Evaluation(plan, store, ledger, shared, executor, progress)
         evaluation.run()
         watch.lap("evaluation")

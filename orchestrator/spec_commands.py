@@ -91,7 +91,7 @@ def _option(words: list[str], name: str) -> str:
 def plan(words: list[str], output: Console) -> None:
     """`skillstitch plan SPEC [options]`."""
     from orchestrator.cores import check_workers
-    from orchestrator.printing import forecast_lines, plan_lines, suite_plan_lines
+    from orchestrator.printing import data_lines, forecast_lines, plan_lines, suite_plan_lines
     from orchestrator.storage.ledger import Ledger
     from orchestrator.storage.store import Store
     from orchestrator.work.costs import estimate
@@ -104,7 +104,11 @@ def plan(words: list[str], output: Console) -> None:
     else:
         made, store = make_plan(asked), Store(command.store)
         costs = estimate(made, store, Ledger.look(command.store / "blocks.sqlite"))
-        lines = chain(plan_lines(asked, costs, command.workers), forecast_lines(made, store))
+        lines = chain(
+            plan_lines(asked, costs, command.workers),
+            data_lines(made, store),
+            forecast_lines(made, store),
+        )
     for line in lines:
         output.print(line, markup=False)
 

@@ -22,6 +22,7 @@ from analysis.page.studies import (
 from analysis.page.tables import claims_html, gains_html, html_table, scores_html
 from analysis.paper.verdicts import error_reading, explanation
 from analysis.run import Run
+from analysis.studies.data import undemonstrated, undemonstrated_note
 from analysis.tables.skills import permutation_scores, single_skill_rates
 from analysis.tables.table import Table
 from analysis.tables.writers import BOOTSTRAP, describe, seed_note
@@ -53,6 +54,7 @@ def render_page(
 ) -> str:
     """The whole page; `figures` is the folder the figures were drawn into."""
     sections = {
+        "data": ("Skills without data", _left_out(run)),
         "quarantine": ("Quarantine", _quarantine(run)),
         **{
             table.entry.id: (table.entry.title, _table_section(table, drawn, figures))
@@ -123,6 +125,11 @@ def _badges(run: Run, tables: list[Table]) -> str:
     if any(table.missing for table in tables):
         html += '<span class="badge partial">partial</span>'
     return html
+
+
+def _left_out(run: Run) -> str:
+    note = undemonstrated_note(undemonstrated(run))
+    return f'<p class="notice">{escape(note)}</p>' if note else ""
 
 
 def _quarantine(run: Run) -> str:

@@ -12,6 +12,7 @@ from orchestrator.builders.long_horizon import LONG_HORIZON_BUILDERS
 from orchestrator.builders.studies import Studies
 from orchestrator.errors import UsageError
 from stitching.data.kitchen.demonstrations import KitchenDataConfig, Order, orders
+from stitching.data.kitchen.human import recordings_at
 from stitching.envs.kitchen import GROUPS, KITCHEN
 from stitching.studies.showcase.physics import StepRecorder
 
@@ -19,12 +20,6 @@ from stitching.studies.showcase.physics import StepRecorder
 def _datasets(config: KitchenDataConfig) -> dict[str, Dataset]:
     """One artifact an order, so that they are collected in parallel."""
     if config.source == "human":
-        if config.human.endswith(".npz") and not Path(config.human).is_file():
-            raise UsageError(f"data.human: no file {config.human}")
-        if not config.human:
-            raise UsageError(
-                "data.human: name an .npz file or a Minari dataset, as D4RL/kitchen/complete-v2"
-            )
         return {"demonstrations": Dataset("kitchen-human", {"sha256": _sha256(config.human)})}
     return {
         f"demonstrations-{short_order(order)}": Dataset("kitchen-demonstrations", {"order": order})
@@ -50,9 +45,30 @@ def short_order(order: Order) -> str:
     return "-".join(name.split()[0] for name in order)
 
 
-def _sha256(file: str) -> str:
-    """Of a local file, so that another content is another dataset; hub ids name one content."""
-    return hashlib.sha256(Path(file).read_bytes()).hexdigest() if Path(file).is_file() else ""
+def _sha256(source: str) -> str:
+    """Of people's recordings, so that another content is another dataset, whatever its name.
+
+    Raises UsageError where there is none.
+    """
+    if not source:
+        raise UsageError(
+            "data.human: name an .npz file or a Minari dataset, as D4RL/kitchen/complete-v2"
+        )
+    place = recordings_at(source)
+    if source.endswith(".npz") and not place.is_file():
+        raise UsageError(f"data.human: no file {source}")
+    if not place.exists():
+        raise UsageError(
+            f"data.human: no Minari dataset at {place}; fetch it with `minari download {source}`, "
+            "or set MINARI_DATASETS_PATH to where it is"
+        )
+    files = [place] if place.is_file() else sorted(p for p in place.rglob("*") if p.is_file())
+    total = hashlib.sha256()
+    for file in files:
+        total.update(str(file.relative_to(place)).encode())
+        with file.open("rb") as content:
+            total.update(hashlib.file_digest(content, "sha256").digest())
+    return total.hexdigest()
 
 
 STUDIES = Studies("kitchen", {KITCHEN.name: KITCHEN}, GROUPS, foretells=True)

@@ -37,6 +37,6 @@ SETUP = ("orchestrator.builders.kitchen", "orchestrator.builders.parts")
 
 KITCHEN_BUILDERS = {
     "kitchen-demonstrations": Builder(_demonstrations, DATA, SETUP),
-    "kitchen-human": Builder(_human, ("stitching.data.kitchen.human",), SETUP),
+    "kitchen-human": Builder(_human, ("stitching.data.kitchen.human",), SETUP, by_driver=True),
     "kitchen-held-out": Builder(_held_out, DATA, SETUP),
 }

@@ -21,6 +21,7 @@ class Builder:
     make: Callable[[Plain, Inputs], Artifact]
     code: tuple[str, ...]  # the modules whose code, with all they import, decides the content
     setup: tuple[str, ...]  # those that set it up, without what they import for other purposes
+    by_driver: bool = False  # it reads what only the machine of the command surely has
 
 
 def as_artifact(data: Transitions) -> Artifact:

@@ -7,6 +7,7 @@ import pandas as pd
 
 from analysis.schema import DATASETS, EPISODE_COLUMNS, QUARANTINE, SEGMENTS, SEPARATOR, TRAINING
 from orchestrator.spec.structure import Plain
+from orchestrator.storage.datasets import datasets
 from orchestrator.storage.ledger import Ledger
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.storage.store import Store
@@ -71,20 +72,6 @@ def learning_curves(plan: Plan, store: Store) -> list[Plain]:
                 }
             )
     return curves
-
-
-def datasets(plan: Plan, store: Store) -> list[Plain]:
-    """What was learned from: rows, episodes and content digest of each dataset."""
-    listing = []
-    for name, key in plan.datasets.items():
-        kind = plan.recipes[key].kind
-        info = store.read(kind, key).info
-        digest = store.manifest(kind, key)["digest"]
-        listing.append(
-            {"name": name, "key": key, "digest": digest}
-            | {field: value for field, value in info.items() if field != "format"}
-        )
-    return listing
 
 
 def write_readable(plan: Plan, store: Store, ledger: Ledger, directory: RunDirectory) -> Plain:

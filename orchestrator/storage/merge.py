@@ -220,8 +220,8 @@ def _trained(model: Plain, naming: Naming) -> Iterator[Plain]:
 
 
 def _dataset(dataset: Plain, naming: Naming) -> Iterator[Plain]:
-    """Without the orders that its demonstrations show: they hold for one part's pairs alone."""
-    kept = {name: value for name, value in dataset.items() if name != "orders"}
+    """Without what is told by skills' names, which hold for one part alone."""
+    kept = {name: value for name, value in dataset.items() if name not in ("orders", "skills")}
     yield kept | {"name": f"{naming.part.label}: {dataset['name']}"}
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
+from orchestrator.builders.registry import BUILDERS
 from orchestrator.errors import BadDataError, ChangedError, IncompleteError
 from orchestrator.executors.protocol import Executor
 from orchestrator.storage.ledger import Ledger
@@ -15,6 +17,7 @@ from orchestrator.work.jobs import ATTEMPTS, BuildJob, Report
 from orchestrator.work.plan import Plan
 from orchestrator.work.progress import Progress
 from orchestrator.work.recipes import Recipe
+from orchestrator.work.worker import build
 
 
 def verified_artifacts(plan: Plan, store: Store, ledger: Ledger, progress: Progress) -> set[str]:
@@ -103,13 +106,17 @@ class Builds:
 
     def _run(self, missing: dict[str, Recipe], available: set[str], submitted: set[str]) -> float:
         """Keys of what is there and of what has been submitted change as the builds go on."""
-        seconds = 0.0
+        seconds, own = 0.0, deque[BuildJob]()  # jobs for the driver
         while not set(missing) <= available:
             for key, recipe in missing.items():
                 if key not in submitted and set(recipe.inputs.values()) <= available:
-                    self.executor.submit(BuildJob(recipe, self.store.checkpoints(key)))
+                    job = BuildJob(recipe, self.store.checkpoints(key))
                     submitted.add(key)
-            report = self.executor.next()
+                    if BUILDERS[recipe.kind].by_driver:
+                        own.append(job)
+                    else:
+                        self.executor.submit(job)
+            report = build(own.popleft(), {}) if own else self.executor.next()
             assert isinstance(report.job, BuildJob)
             recipe = report.job.recipe
             if self._finish(recipe, report):
