@@ -5,6 +5,6 @@ import pandas as pd
 
 def row(table: pd.DataFrame, *key: str | int) -> pd.Series:
     """The one under this key of the table's index."""
-    found = table.xs(key)
+    found = table.xs(key if len(key) > 1 else key[0])
     assert isinstance(found, pd.Series)
     return found

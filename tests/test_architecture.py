@@ -1,4 +1,4 @@
-"""The rules of the house: which package may import what, and how long a file may grow.
+"""The rules of the house: which package may import what, how long files and folders may grow.
 
 stitching ← orchestrator ← sweeps;  analysis stands alone;  the command line sees everything
 """
@@ -6,6 +6,7 @@ stitching ← orchestrator ← sweeps;  analysis stands alone;  the command line
 import ast
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -74,6 +75,14 @@ def importers_of(module: str, within: str = "") -> set[str]:
 )
 def test_the_reader_of_imports_finds(line: str, name: str) -> None:
     assert name in names_in(line, "orchestrator/executors/serial.py")
+
+
+def test_no_folder_has_more_than_fourteen_modules() -> None:
+    """What is to be found in a folder should be seen at a glance; tests mirror the sources."""
+    folders = (*PACKAGES, "tests", "docs")
+    files = [file for folder in folders for file in (ROOT / folder).rglob("*.py")]
+    counts = Counter(file.parent.relative_to(ROOT) for file in files if file.name != "__init__.py")
+    assert not {str(folder): count for folder, count in counts.items() if count > 14}
 
 
 def test_the_sources_are_found() -> None:

@@ -1,5 +1,6 @@
 """A synthetic Kitchen run directory: four skills, two methods, one order in the data."""
 
+from collections.abc import Callable
 from itertools import pairwise, permutations
 from pathlib import Path
 from typing import Any
@@ -172,5 +173,5 @@ def kitchen_files() -> dict[str, Any]:
     }  # fmt: skip
 
 
-def write_kitchen(write_run: Any, run_dir: Path, **files: Any) -> Path:
-    return Path(write_run(run_dir, kitchen_segments(), **{**kitchen_files(), **files}))
+def write_kitchen(write_run: Callable[..., Path], run_dir: Path, **files: Any) -> Path:
+    return write_run(run_dir, kitchen_segments(), **{**kitchen_files(), **files})

@@ -1,3 +1,4 @@
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from tests.rows import row
 
 
 @pytest.fixture
-def run_a(tmp_path: Path, write_run: Any) -> Path:
+def run_a(tmp_path: Path, write_run: Callable[..., Path]) -> Path:
     return write_run(tmp_path / "a")
 
 
@@ -30,7 +31,7 @@ def test_a_run_equals_itself(run_a: Path) -> None:
 
 
 def test_a_difference_is_found_and_paired(
-    run_a: Path, tmp_path: Path, segments: Any, write_run: Any
+    run_a: Path, tmp_path: Path, segments: pd.DataFrame, write_run: Callable[..., Path]
 ) -> None:
     worse = segments.copy()
     worse.loc[(worse["method"] == "mb-stitch") & (worse["depth"] == 2), "success"] = False
@@ -48,7 +49,7 @@ def test_a_difference_is_found_and_paired(
 
 
 def test_only_common_episodes_count(
-    run_a: Path, tmp_path: Path, segments: Any, write_run: Any
+    run_a: Path, tmp_path: Path, segments: pd.DataFrame, write_run: Callable[..., Path]
 ) -> None:
     run_b = write_run(tmp_path / "b", segments=segments.query("seed < 2 and episode < 5"))
     comparison = compare(run_a, run_b)
@@ -66,7 +67,7 @@ def test_only_common_episodes_count(
     ],
 )
 def test_says_why_nothing_can_be_compared(
-    run_a: Path, tmp_path: Path, spec_dict: Any, write_run: Any, change: Any, reason: str
+    run_a: Path, tmp_path: Path, spec_dict: Callable[..., dict[str, Any]], write_run: Callable[..., Path], change: Any, reason: str
 ) -> None:
     run_b = write_run(tmp_path / "b", spec={**spec_dict(), **change})
     with pytest.raises(NothingToCompareError, match=reason):
@@ -90,7 +91,7 @@ ASKED = {
     ids=["root seed", "benchmark"],
 )
 def test_other_random_numbers_are_not_paired(
-    tmp_path: Path, spec_dict: Any, write_run: Any, what: dict[str, Any], message: str
+    tmp_path: Path, spec_dict: Callable[..., dict[str, Any]], write_run: Callable[..., Path], what: dict[str, Any], message: str
 ) -> None:
     """Between runs, between merged runs, and between a run and a merged one."""
     asked = [(plain, {"parts": [{"label": "x", "spec": plain}]}) for plain in (ASKED, ASKED | what)]
@@ -108,7 +109,7 @@ def test_other_random_numbers_are_not_paired(
         assert len(compare(run_a, runs[0][0])) == 12
 
 
-def test_fields_that_differ_are_listed(tmp_path: Path, spec_dict: Any, write_run: Any) -> None:
+def test_fields_that_differ_are_listed(tmp_path: Path, spec_dict: Callable[..., dict[str, Any]], write_run: Callable[..., Path]) -> None:
     other = ASKED | {"mb_stitch": {"alpha": 5.0, "cem": {"horizon": 5}}, "new": True}
     run_a = write_run(tmp_path / "a", spec=spec_dict() | {"spec": ASKED})
     run_b = write_run(tmp_path / "b", spec=spec_dict() | {"spec": other})
@@ -122,7 +123,7 @@ def test_fields_that_differ_are_listed(tmp_path: Path, spec_dict: Any, write_run
 
 
 def test_an_unfinished_run_has_nothing_yet(
-    run_a: Path, tmp_path: Path, segments: pd.DataFrame, write_run: Any
+    run_a: Path, tmp_path: Path, segments: pd.DataFrame, write_run: Callable[..., Path]
 ) -> None:
     run_b = write_run(tmp_path / "b", segments=segments.query("depth == 1"))
     with pytest.raises(NothingToCompareError, match="resume the one that is incomplete"):
@@ -130,7 +131,7 @@ def test_an_unfinished_run_has_nothing_yet(
 
 
 def test_what_one_run_gave_up_is_compared_in_neither(
-    run_a: Path, tmp_path: Path, segments: pd.DataFrame, write_run: Any
+    run_a: Path, tmp_path: Path, segments: pd.DataFrame, write_run: Callable[..., Path]
 ) -> None:
     block = {"method": "mb-stitch", "seed": 0, "prefix": "g0>g1", "episodes": [0, 1, 2]}
     run_b = write_run(tmp_path / "b", quarantine=[block])

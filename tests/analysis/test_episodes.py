@@ -1,3 +1,4 @@
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -61,7 +62,7 @@ def play_slowly(
     max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(data=st.data())
-def test_agrees_with_the_slow_loop(data: Any, segments_of: Any, spec_dict: Any) -> None:
+def test_agrees_with_the_slow_loop(data: Any, segments_of: Callable[[dict[str, Any]], pd.DataFrame], spec_dict: Callable[..., dict[str, Any]]) -> None:
     """For any lengths, step limits, and whatever blocks are missing."""
     lengths = data.draw(st.sets(st.integers(1, 4), min_size=1, max_size=2))
     raw = spec_dict(seeds=2, episodes=3, lengths=tuple(sorted(lengths)))
@@ -84,7 +85,7 @@ def test_agrees_with_the_slow_loop(data: Any, segments_of: Any, spec_dict: Any) 
 
 
 @pytest.fixture
-def toy(spec_dict: Any) -> tuple[RunSpec, pd.DataFrame]:
+def toy(spec_dict: Callable[..., dict[str, Any]]) -> tuple[RunSpec, pd.DataFrame]:
     """A succeeds in six of ten episodes, then B in all six: A>B is worth 0.6."""
     raw = {**spec_dict(seeds=1), "methods": [{"name": "mb"}, {"name": "other"}]}
     spec = RunSpec.from_dict({**raw, "tasks": ["A", "A>B", "A>B>C"], "skills": ["A", "B", "C"]})
@@ -154,7 +155,7 @@ def test_quarantine_of_what_nobody_asked_for_is_ignored(toy: Any) -> None:
     assert set(counts(episodes_from_segments(segments, narrow, quarantine)).values()) == {4}
 
 
-def test_a_lost_first_skill_takes_every_method_with_it(segments: Any, spec: RunSpec) -> None:
+def test_a_lost_first_skill_takes_every_method_with_it(segments: pd.DataFrame, spec: RunSpec) -> None:
     whole = episodes_from_segments(segments, spec)
     lost = segments.query("not (prefix == 'g0' and seed == 1 and episode == 3)")
     left_out = whole.query("task.str.startswith('g0') and seed == 1 and episode == 3")
@@ -162,14 +163,14 @@ def test_a_lost_first_skill_takes_every_method_with_it(segments: Any, spec: RunS
     assert len(episodes_from_segments(lost, spec)) == len(whole) - len(left_out)
 
 
-def test_segments_nobody_asked_for_are_ignored(segments: Any, spec: RunSpec) -> None:
+def test_segments_nobody_asked_for_are_ignored(segments: pd.DataFrame, spec: RunSpec) -> None:
     narrow = replace(spec, tasks=("g0>g1",), seeds=(1,), episodes=2)
     episodes = episodes_from_segments(segments, narrow)
     assert len(episodes) == 4 * 2
     assert set(episodes["seed"]) == {1}
 
 
-def test_a_method_may_have_first_skills_of_its_own(segments: Any, spec: RunSpec) -> None:
+def test_a_method_may_have_first_skills_of_its_own(segments: pd.DataFrame, spec: RunSpec) -> None:
     """Single-Policy's first skill is played by another policy than everybody else's."""
     failing = segments.query("depth == 1").assign(method="no-stitch", success=False)
     both = pd.concat([segments.query("depth == 1 or method != 'no-stitch'"), failing])
@@ -181,19 +182,19 @@ def test_a_method_may_have_first_skills_of_its_own(segments: Any, spec: RunSpec)
     assert scores["mb-stitch"] > 0.9
 
 
-def test_until_they_are_played_such_a_method_has_no_episodes(segments: Any, spec: RunSpec) -> None:
+def test_until_they_are_played_such_a_method_has_no_episodes(segments: pd.DataFrame, spec: RunSpec) -> None:
     """It must not borrow the shared first skills."""
     own = replace(spec, own_first_skill=frozenset({"no-stitch"}))
     episodes = episodes_from_segments(segments.query("method != 'no-stitch'"), own)
     assert "no-stitch" not in set(episodes["method"])
 
 
-def test_a_segment_given_twice_is_refused(segments: Any, spec: RunSpec) -> None:
+def test_a_segment_given_twice_is_refused(segments: pd.DataFrame, spec: RunSpec) -> None:
     with pytest.raises(RunError, match="twice"):
         episodes_from_segments(pd.concat([segments, segments[:1]]), spec)
 
 
-def test_the_file_has_reproducible_bytes(tmp_path: Path, segments: Any, write_run: Any) -> None:
+def test_the_file_has_reproducible_bytes(tmp_path: Path, segments: pd.DataFrame, write_run: Callable[..., Path]) -> None:
     shuffled = segments.sample(frac=1, random_state=1)
     paths = [
         write_run(tmp_path / name, segments=rows)

@@ -1,5 +1,6 @@
 """The report of a Kitchen run; that of the maze is tested in test_report."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +37,7 @@ def _drawing_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("analysis.figures.showcase.showcases.render_frames", frames)
 
 
-def test_the_same_run_gives_the_same_bytes(tmp_path: Path, write_run: Any) -> None:
+def test_the_same_run_gives_the_same_bytes(tmp_path: Path, write_run: Callable[..., Path]) -> None:
     for name in ("a", "b"):
         export_results(write_kitchen(write_run, tmp_path / name), tmp_path / f"results-{name}")
     assert contents(tmp_path / "a" / "report") == contents(tmp_path / "b" / "report")
@@ -50,7 +51,7 @@ def test_the_same_run_gives_the_same_bytes(tmp_path: Path, write_run: Any) -> No
     assert "table2/figures/contact-sheet.svg" not in vectors
 
 
-def test_the_page_says_what_the_files_say(tmp_path: Path, write_run: Any) -> None:
+def test_the_page_says_what_the_files_say(tmp_path: Path, write_run: Callable[..., Path]) -> None:
     page = build_report(write_kitchen(write_run, tmp_path / "run")).read_text(encoding="utf-8")
     assert "Pairs of skills" in page
     assert "Are the models right?" in page
@@ -68,7 +69,7 @@ def test_the_page_says_what_the_files_say(tmp_path: Path, write_run: Any) -> Non
 
 
 def test_without_a_picture_the_report_is_written_and_says_why(
-    tmp_path: Path, write_run: Any, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, write_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def nothing(scene: dict[str, Any], positions: np.ndarray) -> np.ndarray:
         raise NoPictureError("MuJoCo draws with nothing <here>; install libegl1 or libosmesa6")
@@ -82,7 +83,7 @@ def test_without_a_picture_the_report_is_written_and_says_why(
     assert not (folder / "figures" / "contact-sheet.png").exists()
 
 
-def test_a_run_that_has_only_begun_can_be_reported(tmp_path: Path, write_run: Any) -> None:
+def test_a_run_that_has_only_begun_can_be_reported(tmp_path: Path, write_run: Callable[..., Path]) -> None:
     run_dir = write_kitchen(write_run, tmp_path / "run", showcase=None)
     segments = pd.read_parquet(run_dir / "segments.parquet")
     segments.query("depth == 1").to_parquet(run_dir / "segments.parquet", index=False)
@@ -91,7 +92,7 @@ def test_a_run_that_has_only_begun_can_be_reported(tmp_path: Path, write_run: An
     assert "97 of 100" in page
 
 
-def test_the_maze_is_reported_as_before(tmp_path: Path, write_run: Any) -> None:
+def test_the_maze_is_reported_as_before(tmp_path: Path, write_run: Callable[..., Path]) -> None:
     """Its datasets tell no orders."""
     plain = write_run(tmp_path / "plain")
     told = write_run(tmp_path / "told", datasets=[{"name": "demonstrations", "rows": 9}])

@@ -1,5 +1,6 @@
 """A run as pandas tables: the same numbers as its report."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
@@ -11,9 +12,8 @@ from analysis.schema import RunError
 
 
 @pytest.fixture
-def run_dir(write_run, tmp_path: Path) -> Path:  # type: ignore[no-untyped-def]
-    run: Path = write_run(tmp_path / "run")
-    return run
+def run_dir(write_run: Callable[..., Path], tmp_path: Path) -> Path:
+    return write_run(tmp_path / "run")
 
 
 def test_scores_and_gains_are_the_report_s(run_dir: Path) -> None:

@@ -1,3 +1,4 @@
+from collections.abc import Callable
 import json
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.fixture(scope="module")
-def run_dir(tmp_path_factory: pytest.TempPathFactory, write_run: Any) -> Path:
+def run_dir(tmp_path_factory: pytest.TempPathFactory, write_run: Callable[..., Path]) -> Path:
     return write_run(tmp_path_factory.mktemp("report") / "run")
 
 
@@ -34,7 +35,7 @@ def test_exports_what_is_kept_with_the_code(exported: Path) -> None:
 
 
 def test_the_same_run_gives_the_same_bytes(
-    run_dir: Path, exported: Path, tmp_path: Path, segments: Any, write_run: Any
+    run_dir: Path, exported: Path, tmp_path: Path, segments: pd.DataFrame, write_run: Callable[..., Path]
 ) -> None:
     """Wherever the run lies, and in whatever order its segments were written."""
     elsewhere = write_run(tmp_path / "other", segments=segments[::-1])
@@ -51,7 +52,7 @@ def test_the_page_is_self_contained(run_dir: Path, exported: Path) -> None:
     assert str(run_dir) not in page
 
 
-def test_a_partial_run_is_reported_as_such(tmp_path: Path, segments: Any, write_run: Any) -> None:
+def test_a_partial_run_is_reported_as_such(tmp_path: Path, segments: pd.DataFrame, write_run: Callable[..., Path]) -> None:
     """Quarantined blocks are named; without the optional files the page simply lacks parts."""
     lost = segments.query("not (method == 'mb-stitch' and prefix == 'g0>g1' and seed == 2)")
     block = {
@@ -73,7 +74,7 @@ def test_a_partial_run_is_reported_as_such(tmp_path: Path, segments: Any, write_
 
 
 def test_the_old_results_stay_until_the_new_are_whole(
-    tmp_path: Path, write_run: Any, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, write_run: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run_dir = write_run(tmp_path / "run", training=None, showcase=None)
     export_results(run_dir, tmp_path / "results")
@@ -94,7 +95,7 @@ def test_the_old_results_stay_until_the_new_are_whole(
 
 
 def test_a_run_that_has_only_begun_can_be_reported(
-    tmp_path: Path, segments: Any, write_run: Any
+    tmp_path: Path, segments: pd.DataFrame, write_run: Callable[..., Path]
 ) -> None:
     begun = segments.query("depth == 1 and seed == 0")
     page = build_report(write_run(tmp_path / "run", segments=begun)).read_text(encoding="utf-8")
@@ -102,7 +103,7 @@ def test_a_run_that_has_only_begun_can_be_reported(
     assert pd.read_parquet(tmp_path / "run" / "episodes.parquet").empty
 
 
-def test_names_cannot_break_out_of_the_page(tmp_path: Path, spec_dict: Any, write_run: Any) -> None:
+def test_names_cannot_break_out_of_the_page(tmp_path: Path, spec_dict: Callable[..., dict[str, Any]], write_run: Callable[..., Path]) -> None:
     spec = {**spec_dict(), "title": "<script>alert(1)</script>"}
     spec["skill_labels"] = {"g0": "</script><b>"}
     page = build_report(write_run(tmp_path / "run", spec=spec)).read_text(encoding="utf-8")

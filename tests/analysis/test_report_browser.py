@@ -2,7 +2,7 @@
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Callable
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +40,7 @@ def chromium() -> Iterator[Any]:
 
 
 @pytest.fixture(scope="module")
-def report(tmp_path_factory: pytest.TempPathFactory, write_run: Any) -> Path:
+def report(tmp_path_factory: pytest.TempPathFactory, write_run: Callable[..., Path]) -> Path:
     return build_report(write_run(tmp_path_factory.mktemp("browser") / "run"))
 
 

@@ -1,5 +1,6 @@
 """Results kept with the code: none is lost to a smaller run, or to a folder that takes nothing."""
 
+from collections.abc import Callable
 import json
 from pathlib import Path
 from typing import Any
@@ -71,7 +72,7 @@ def test_a_folder_that_takes_nothing_is_found_before_anything_runs(tmp_path: Pat
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "link"]
 
 
-def test_an_export_is_read_like_the_run(tmp_path: Path, write_run: Any) -> None:
+def test_an_export_is_read_like_the_run(tmp_path: Path, write_run: Callable[..., Path]) -> None:
     run_dir = write_run(tmp_path / "run", training=None, showcase=None)
     (folder,) = export_results(run_dir, tmp_path / "results")
     ours, kept_ones = open_run(run_dir), open_run(folder)
@@ -79,7 +80,7 @@ def test_an_export_is_read_like_the_run(tmp_path: Path, write_run: Any) -> None:
     pd.testing.assert_frame_equal(kept_ones.scores("table1"), ours.scores("table1"))
 
 
-def test_an_export_says_its_extent_and_keeps_to_it(tmp_path: Path, write_run: Any) -> None:
+def test_an_export_says_its_extent_and_keeps_to_it(tmp_path: Path, write_run: Callable[..., Path]) -> None:
     run_dir = write_run(tmp_path / "run", training=None, showcase=None)
     (folder,) = export_results(run_dir, tmp_path / "results")
     extent = extent_of(folder)

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 from unittest import mock
 
 import numpy as np
@@ -22,8 +22,10 @@ from orchestrator.spec.spec import Spec
 from orchestrator.storage.claim import claim_for_spec
 from orchestrator.storage.store import Artifact
 from orchestrator.work import playing
+from orchestrator.work.jobs import Report
 from orchestrator.work.plan import Plan
 from stitching.methods.mb_stitch import MBStitchSettings
+from stitching.rollout import Segments, play_segment
 from tests.orchestrator.tiny import TINY, Counted, Place, carry_out, promised_bytes, serially
 from tests.sections import section, with_sections
 
@@ -266,7 +268,7 @@ def test_nondeterminism_is_6(cli: Cli, trained: Place, finished: Place, plan: Pl
     ledger.close()
 
     class Other(Counted):
-        def next(self):  # type: ignore[no-untyped-def]
+        def next(self) -> Report:
             trained.shared().record([(key, theirs[1] + b" ")])
             return super().next()
 
@@ -292,9 +294,7 @@ def test_bad_data_is_7(cli: Cli, place: Place, finished: Place, plan: Plan) -> N
 def test_blocks_given_up_are_3_with_the_partial_table(
     cli: Cli, trained: Place, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    play_segment = playing.play_segment
-
-    def faulty(*arguments):  # type: ignore[no-untyped-def]
+    def faulty(*arguments: Any) -> Segments:
         if any(getattr(item, "prefix", ()) == ("g0",) for item in arguments):
             raise RuntimeError("the simulator fell over")
         return play_segment(*arguments)

@@ -7,18 +7,19 @@ import pytest
 
 from orchestrator.cli import COMMANDS
 from orchestrator.spec.spec import load_spec
+from orchestrator.spec.tomls import Scale
 from orchestrator.work.plan import make_plan
 
 ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.parametrize("scale", ["smoke", "paper"])
-def test_the_example_table_can_be_planned(tmp_path: Path, scale: str) -> None:
+def test_the_example_table_can_be_planned(tmp_path: Path, scale: Scale) -> None:
     text = (ROOT / "docs" / "extending.md").read_text()
     _, example = re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL)
     path = tmp_path / "my-table.toml"
     path.write_text(example)
-    spec = load_spec(str(path), scale)  # type: ignore[arg-type]
+    spec = load_spec(str(path), scale)
     assert make_plan(spec).nodes
 
 

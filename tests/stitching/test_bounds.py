@@ -66,8 +66,8 @@ def settings(cls: type, seen: set[type]) -> Iterator[type]:
     yield cls
     for hint in get_type_hints(cls).values():
         for part in parts(hint):
-            if is_dataclass(part):
-                yield from settings(part, seen)  # type: ignore[arg-type]
+            if isinstance(part, type) and is_dataclass(part):
+                yield from settings(part, seen)
 
 
 def parts(hint: Any) -> Iterator[Any]:

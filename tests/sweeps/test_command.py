@@ -20,7 +20,8 @@ from orchestrator.storage.rundir import RunDirectory
 from orchestrator.work.progress import Silent
 from sweeps import winner as winners
 from sweeps.candidates import method_of
-from sweeps.results.figures import draw_figures, paper_gains, pareto_front
+from sweeps.results.figures import draw_figures, paper_gains
+from sweeps.scoring import pareto_front
 from sweeps.search import run_search
 from sweeps.space import Dimension
 from sweeps.spec import Confirm, load_sweep

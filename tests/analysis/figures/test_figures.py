@@ -1,3 +1,5 @@
+import pandas as pd
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +16,7 @@ from analysis.tables.table import build_table
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory, write_run: Any) -> Run:
+def run(tmp_path_factory: pytest.TempPathFactory, write_run: Callable[..., Path]) -> Run:
     return load_run(write_run(tmp_path_factory.mktemp("figures") / "run"))
 
 
@@ -33,7 +35,7 @@ def test_draws_what_there_is_data_for(run: Run, tmp_path: Path) -> None:
         assert "<dc:date>" not in (tmp_path / f"{figure.name}.svg").read_text()
 
 
-def test_pair_rates_are_of_the_second_skill_given_the_first(segments: Any, spec: RunSpec) -> None:
+def test_pair_rates_are_of_the_second_skill_given_the_first(segments: pd.DataFrame, spec: RunSpec) -> None:
     rates = pair_rates(segments, spec, "mb-stitch")
     assert rates.shape == (4, 4)
     assert np.isnan(np.diag(rates)).all()
@@ -41,5 +43,5 @@ def test_pair_rates_are_of_the_second_skill_given_the_first(segments: Any, spec:
     assert rates[0, 2] == pytest.approx(seconds["success"].mean())
 
 
-def test_pair_rates_of_a_method_not_played_are_unknown(segments: Any, spec: RunSpec) -> None:
+def test_pair_rates_of_a_method_not_played_are_unknown(segments: pd.DataFrame, spec: RunSpec) -> None:
     assert np.isnan(pair_rates(segments, spec, "unheard-of")).all()

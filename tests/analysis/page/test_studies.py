@@ -1,5 +1,6 @@
 """Sections of the page: what they show where a run has no baseline."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from analysis.studies.pairs import both_skills, pair_groups, second_skills
 from tests.analysis.kitchen_run import METHODS, ORDERS, kitchen_spec, write_kitchen
 
 
-def section(write_run: Any, folder: Path, methods: list[str], *, own_first_skill: bool) -> str:
+def section(write_run: Callable[..., Path], folder: Path, methods: list[str], *, own_first_skill: bool) -> str:
     named = [
         {"name": name, "label": METHODS[name], "own_first_skill": own_first_skill}
         for name in methods
@@ -23,7 +24,7 @@ def section(write_run: Any, folder: Path, methods: list[str], *, own_first_skill
 
 @pytest.mark.parametrize("own_first_skill", [True, False])
 def test_gains_are_shown_where_there_is_a_baseline(
-    tmp_path: Path, write_run: Any, own_first_skill: bool
+    tmp_path: Path, write_run: Callable[..., Path], own_first_skill: bool
 ) -> None:
     both = section(write_run, tmp_path / "both", list(METHODS), own_first_skill=own_first_skill)
     assert both.count(">Gain over No-Stitch<") == 2

@@ -47,7 +47,7 @@ def test_cell_verdicts(score: float, low: float, high: float, paper: float, verd
 
 
 @pytest.fixture(scope="module")
-def table(segments: Any, spec: RunSpec) -> Table:
+def table(segments: pd.DataFrame, spec: RunSpec) -> Table:
     return build_table(episodes_from_segments(segments, spec), spec, spec.tables[0])
 
 
@@ -69,7 +69,7 @@ def test_a_lead_is_judged_by_its_interval(
     assert claims(replace(table, leads=leads))[0].verdict == verdict
 
 
-def test_a_verdict_from_one_seed_is_of_its_models_alone(segments: Any, spec: RunSpec) -> None:
+def test_a_verdict_from_one_seed_is_of_its_models_alone(segments: pd.DataFrame, spec: RunSpec) -> None:
     alone = replace(spec, seeds=(0,))
     one = build_table(episodes_from_segments(segments, alone), alone, alone.tables[0])
     found = claims(one)
@@ -92,7 +92,7 @@ def test_a_smoke_run_is_not_judged(table: Table) -> None:
     assert error_reading(smoke) == ""
 
 
-def test_rows_of_other_tasks_make_no_claim(segments: Any, spec: RunSpec) -> None:
+def test_rows_of_other_tasks_make_no_claim(segments: pd.DataFrame, spec: RunSpec) -> None:
     """One task of twelve is not the paper's "2 goals"; the other rows are as they were."""
     few = replace(spec, tasks=tuple(t for t in spec.tasks if t.count(">") != 1 or t == "g0>g1"))
     table = build_table(episodes_from_segments(segments, few), few, few.tables[0])

@@ -1,7 +1,9 @@
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from analysis.run import load_run
@@ -35,7 +37,7 @@ def test_auc_needs_both_outcomes_of_one_seed() -> None:
     assert auc(values, np.array([False, True]), np.array([0, 0])) == 1.0
 
 
-def test_all_models_are_in_the_table(tmp_path: Path, write_run: Any) -> None:
+def test_all_models_are_in_the_table(tmp_path: Path, write_run: Callable[..., Path]) -> None:
     run = load_run(write_kitchen(write_run, tmp_path / "run"))
     table = model_table(run).set_index(["measure", "of"])
     assert table.loc["competence"].index.tolist() == SKILLS
@@ -49,4 +51,4 @@ def test_all_models_are_in_the_table(tmp_path: Path, write_run: Any) -> None:
     assert table.loc[("after other skills", "kettle"), "successes"] == plain["success"].sum()
     expected = brute_force(*(plain[name].to_numpy() for name in ("value_start", "success", "seed")))
     assert table.loc[("auc", "kettle"), "value"] == pytest.approx(expected)
-    assert np.isnan(row(table, "auc", "microwave")["value"])  # it never succeeds second
+    assert pd.isna(row(table, "auc", "microwave")["value"])  # it never succeeds second

@@ -1,3 +1,4 @@
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -40,14 +41,14 @@ def merged_files() -> dict[str, Any]:
     return files
 
 
-def merged_run(write_run: Any, folder: Path) -> Path:
+def merged_run(write_run: Callable[..., Path], folder: Path) -> Path:
     plain = kitchen_segments()
     segments = plain[plain["method"] != ""]
     copies = [segments.assign(method=segments["method"] + f"@{label}") for label in LEVELS]
     return Path(write_run(folder, pd.concat(copies, ignore_index=True), **merged_files()))
 
 
-def test_rates_of_every_skill_of_a_run(tmp_path: Path, write_run: Any) -> None:
+def test_rates_of_every_skill_of_a_run(tmp_path: Path, write_run: Callable[..., Path]) -> None:
     rates = rate_table(load_run(write_kitchen(write_run, tmp_path / "run"))).set_index("skill")
     kettle = rates.to_dict("index")["kettle"]
     assert (kettle["own_successes"], kettle["own_trials"]) == (97, 100)
@@ -59,7 +60,7 @@ def test_rates_of_every_skill_of_a_run(tmp_path: Path, write_run: Any) -> None:
     assert kettle["beta_scaled"] == pytest.approx(5.0 * 0.04 / 0.08)
 
 
-def test_a_level_has_its_own_rates_and_no_stitched_ones(tmp_path: Path, write_run: Any) -> None:
+def test_a_level_has_its_own_rates_and_no_stitched_ones(tmp_path: Path, write_run: Callable[..., Path]) -> None:
     rates = rate_table(load_run(merged_run(write_run, tmp_path / "run")))
     rates = rates.set_index(["part", "skill"])
     trials = rates["after_trials"]
@@ -73,7 +74,7 @@ def test_a_level_has_its_own_rates_and_no_stitched_ones(tmp_path: Path, write_ru
     assert lines[0][3] == "–", "nothing comes before the microwave"
 
 
-def test_they_stand_beside_the_table(tmp_path: Path, write_run: Any) -> None:
+def test_they_stand_beside_the_table(tmp_path: Path, write_run: Callable[..., Path]) -> None:
     run = merged_run(write_run, tmp_path / "run")
     build_report(run)
     report = run / "report"

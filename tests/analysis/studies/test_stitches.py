@@ -1,5 +1,6 @@
 """What came of stitches, and what warned: in numbers, on the page, and as a figure."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from tests.rows import row
 
 
 @pytest.fixture(params=["alone", "merged"])
-def run(request: pytest.FixtureRequest, tmp_path: Path, write_run: Any) -> Run:
+def run(request: pytest.FixtureRequest, tmp_path: Path, write_run: Callable[..., Path]) -> Run:
     """A run of its own, or two merged, of which one has no stitches."""
     study = kitchen_stitches()
     if request.param == "merged":
@@ -83,7 +84,7 @@ def test_the_page_has_a_line_for_each_part_and_outcome(run: Run) -> None:
     assert "-9.00 → -11.00" in html
 
 
-def test_first_skills_and_hand_overs_are_told_apart(tmp_path: Path, write_run: Any) -> None:
+def test_first_skills_and_hand_overs_are_told_apart(tmp_path: Path, write_run: Callable[..., Path]) -> None:
     study = kitchen_first_skills()
     run = load_run(write_kitchen(write_run, tmp_path / "run", stitches=study))
     table = outcome_table(run).set_index("kind")
@@ -102,7 +103,7 @@ def test_first_skills_and_hand_overs_are_told_apart(tmp_path: Path, write_run: A
     assert FIRST_SKILLS in figure.axes[0].get_ylabel()
 
 
-def test_nothing_was_stitched(tmp_path: Path, write_run: Any) -> None:
+def test_nothing_was_stitched(tmp_path: Path, write_run: Callable[..., Path]) -> None:
     nothing = kitchen_stitches() | {"stitches": []}
     run = load_run(write_kitchen(write_run, tmp_path / "run", stitches=nothing))
     assert outcome_table(run)["stitches"].tolist() == [0]

@@ -1,3 +1,4 @@
+import pandas as pd
 from typing import Any
 
 import pytest
@@ -7,7 +8,7 @@ from analysis.schema import RunSpec
 from analysis.tables.skills import permutation_scores, single_skill_rates
 
 
-def test_single_skills(segments: Any, spec: RunSpec) -> None:
+def test_single_skills(segments: pd.DataFrame, spec: RunSpec) -> None:
     rates = single_skill_rates(segments, spec)
     assert rates["skill"].tolist() == ["g0", "g1", "g2", "g3"]
     assert rates["trials"].tolist() == [30] * 4
@@ -15,7 +16,7 @@ def test_single_skills(segments: Any, spec: RunSpec) -> None:
     assert (rates["low"] < 1).all()
 
 
-def test_every_permutation_of_every_method(segments: Any, spec: RunSpec) -> None:
+def test_every_permutation_of_every_method(segments: pd.DataFrame, spec: RunSpec) -> None:
     episodes = episodes_from_segments(segments, spec)
     scores = permutation_scores(episodes, spec)
     assert len(scores) == 60 * 4

@@ -11,7 +11,7 @@ from analysis.tables.table import GAIN_COLUMNS, SCORE_COLUMNS, Table, build_tabl
 
 
 @pytest.fixture(scope="module")
-def episodes(segments: Any, spec: RunSpec) -> pd.DataFrame:
+def episodes(segments: pd.DataFrame, spec: RunSpec) -> pd.DataFrame:
     return episodes_from_segments(segments, spec)
 
 

@@ -12,7 +12,7 @@ from analysis.tables.writers import describe, latex, seed_note, to_csv, to_latex
 
 
 @pytest.fixture(scope="module")
-def episodes(segments: Any, spec: RunSpec) -> pd.DataFrame:
+def episodes(segments: pd.DataFrame, spec: RunSpec) -> pd.DataFrame:
     return episodes_from_segments(segments, spec)
 
 

@@ -12,6 +12,7 @@ import pytest
 
 from orchestrator.cli import main
 from orchestrator.errors import ChangedError, IncompleteError, LockedError, UsageError
+from orchestrator.reproduction import reproduce
 from orchestrator.spec.spec import TableSpec
 from orchestrator.spec.structure import Plain, to_plain
 from orchestrator.spec.suite import Suite, load_asked
@@ -28,6 +29,7 @@ from orchestrator.storage.rundir import RunDirectory
 from orchestrator.suite_reproduction import reproduce_suite
 from orchestrator.work import playing
 from orchestrator.work.progress import Silent
+from stitching.rollout import Segments, play_segment
 from tests.orchestrator.tiny import TINY, promised_bytes, serially
 
 SUITE = Path(__file__).parents[1] / "suite.toml"
@@ -153,7 +155,7 @@ def test_again_does_nothing(done: Path) -> None:
 def test_stopped_between_parts(finished: Path, tmp_path: Path) -> None:
     import orchestrator.suite_reproduction as carrying
 
-    reproduce, calls = carrying.reproduce, []
+    calls = []
 
     def dying(*arguments: Any) -> RunDirectory:
         calls.append(arguments)
@@ -177,13 +179,12 @@ def test_a_part_that_gives_up_blocks(
 ) -> None:
     shutil.rmtree(done / "out")
     (done / "store" / "blocks.sqlite").unlink()
-    play = playing.play_segment
     second = levels().parts[1].spec
 
-    def faulty(*arguments: Any) -> Any:
+    def faulty(*arguments: Any) -> Segments:
         if any(getattr(item, "prefix", ()) == ("g0",) for item in arguments):
             raise RuntimeError("the simulator fell over")
-        return play(*arguments)
+        return play_segment(*arguments)
 
     monkeypatch.setattr(playing, "play_segment", faulty)
     with pytest.raises(IncompleteError, match="blocks of level-1, level-2 were given up"):

@@ -191,8 +191,8 @@ class Payload:
     def __init__(self, file: Path) -> None:
         self.file = file
 
-    def __reduce__(self) -> tuple[Callable[..., None], tuple[str, str]]:
-        return Path.write_text, (self.file, "owned")  # type: ignore[return-value]
+    def __reduce__(self) -> tuple[Callable[..., int], tuple[Path, str]]:
+        return Path.write_text, (self.file, "owned")
 
 
 def object_array(payload: Payload) -> bytes:

@@ -5,6 +5,7 @@ import sqlite3
 from contextlib import closing
 from itertools import permutations
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -21,7 +22,7 @@ SEEDS = [0, 1]
 CHILDREN = len(METHODS) * len(SEEDS)
 
 
-def make_spec() -> dict:
+def make_spec() -> dict[str, Any]:
     return {
         "name": "table1",
         "title": "MazeRunner: all permutations of goals",
@@ -60,7 +61,7 @@ def write_json(path: Path, content: object) -> None:
     path.write_text(json.dumps(content))
 
 
-def make_provenance(run_id: str) -> dict:
+def make_provenance(run_id: str) -> dict[str, Any]:
     """As it is written at the start; what was spent is added at the end."""
     return {
         "run_id": run_id,

@@ -92,7 +92,7 @@ def test_a_deleted_experiment_is_named(run_dir: Path, uri: str) -> None:
     assert "skillstitch/maze was deleted" in publish(run_dir, uri, finished=True).error
 
 
-def spawn(run_dir: Path, uri: str) -> subprocess.Popen:
+def spawn(run_dir: Path, uri: str) -> subprocess.Popen[bytes]:
     code = (
         "from pathlib import Path; from orchestrator.tracking import publish\n"
         f"outcome = publish(Path({str(run_dir)!r}), {uri!r}, finished=True)\n"

@@ -17,7 +17,7 @@ from orchestrator.work.plan import Node, Plan
 from stitching.envs.protocol import Benchmark, VectorEnv
 from stitching.methods.protocol import Stitcher
 from stitching.models.agent import Agent
-from stitching.rollout import Block, Recorder, RolloutConfig, Segments
+from stitching.rollout import Block, Recorder, RolloutConfig, Segments, play_segment
 from tests.orchestrator.tiny import Counted, Lines, Place, promised_bytes
 
 
@@ -49,8 +49,6 @@ Break = Callable[..., None]
 @pytest.fixture
 def break_blocks(monkeypatch: pytest.MonkeyPatch) -> Iterator[Break]:
     """Make blocks raise while they are played: those a condition holds for, so many times."""
-    play_segment = playing.play_segment
-
     def break_blocks(broken: Callable[[Block], bool], times: int = 10**9) -> None:
         left = Counter[Block]()
 

@@ -74,9 +74,11 @@ def test_what_counts(task: tuple[int, ...], scene: list[set[int]], counted: int)
 
 
 def test_a_goal_that_holds_at_the_start_is_never_achieved() -> None:
-    goals = Goals()
-    env = FirstTimes(goals, SKILLS)
-    goals.reset = lambda streams: goals.step(ONE, np.array([[1.0, 0.0, 0.0]]))  # type: ignore[method-assign]
+    class Reached(Goals):
+        def reset(self, streams: Sequence[np.random.Generator]) -> None:
+            self.holding = np.array([[1.0, 0.0, 0.0]])
+
+    env = FirstTimes(Reached(), SKILLS)
     env.reset(NO_STREAM)
     env.step(ONE, np.array([[1.0, 1.0, 0.0]]))
     assert [bool(env.achieved(ONE, skill)[0]) for skill in range(SKILLS)] == [False, True, False]

@@ -26,7 +26,7 @@ from tests.stitching.methods.linear import ARM, MOVES, linear_agent, streams
 
 OBSERVATION, VALUES, MODELS = 3, 4, 5
 CONDITIONS = np.array([[1.0, 0.0], [0.2, 0.8]], dtype=np.float32)
-REDUCE: dict[Norm, Callable[[list[np.floating]], np.floating]] = {
+REDUCE: dict[Norm, Callable[[list[np.floating[Any]]], np.floating[Any]]] = {
     "mean": np.mean,
     "l2": np.linalg.norm,
     "max": np.max,

@@ -1,14 +1,9 @@
 """Cutting episodes into skills."""
 
-from pathlib import Path
-
 import numpy as np
 
 from stitching.data.kitchen.segments import Episode, cut
 from stitching.envs.kitchen import SKILLS
-
-SHARED = Path(__file__).resolve().parents[4] / "shared"
-REAL = SHARED / "data/kitchen_complete_v2_minari.npz"
 
 
 def episode(steps: int, relocating: slice = slice(0), **achieved: tuple[int, ...]) -> Episode:

@@ -9,7 +9,7 @@ import pytest
 import orchestrator
 from orchestrator.errors import UsageError
 
-EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
+EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
 
 
 def test_the_promised_names_are_there() -> None:

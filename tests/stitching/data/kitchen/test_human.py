@@ -20,7 +20,7 @@ from stitching.data.kitchen.segments import as_transitions, cut
 from stitching.data.transitions import DataError, Transitions, check
 from stitching.envs.kitchen import KITCHEN, SKILLS
 
-SHARED = Path(__file__).resolve().parents[4] / "shared"
+SHARED = Path(__file__).resolve().parents[5] / "shared"
 REAL = SHARED / "data/kitchen_complete_v2_minari.npz"
 
 

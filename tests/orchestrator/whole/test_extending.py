@@ -16,7 +16,7 @@ from orchestrator.spec.spec import load_spec
 from orchestrator.storage.claim import describe
 from orchestrator.work.plan import make_plan
 
-EXAMPLE = Path(__file__).parents[2] / "docs" / "example-package"
+EXAMPLE = Path(__file__).parents[3] / "docs" / "example-package"
 METHODS = ("no-stitch", "hold-stitch", "mb-stitch", "mb-stitch[planner=hold-shooting]")
 RUN = (
     "run", "track.toml", "--scale", "smoke", "--out", "run", "--store", "store",

@@ -48,13 +48,13 @@ def _carry_out_tracked(place: Place) -> None:
     carry_out(tiny_spec(), settings)
 
 
-def in_a_process(target: Callable[..., None], *arguments: Place) -> multiprocessing.Process:
+def in_a_process(target: Callable[..., None], *arguments: Place) -> BaseProcess:
     """From a server that has imported everything, so that kills hit the run and not its start."""
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(["tests.orchestrator.tiny", "matplotlib.pyplot"])
     process = context.Process(target=target, args=arguments)
     process.start()
-    return process  # type: ignore[return-value]
+    return process
 
 
 def check_undisturbed(place: Place, expected: dict[str, bytes]) -> None:

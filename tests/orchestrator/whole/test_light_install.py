@@ -9,7 +9,7 @@ from packaging.requirements import Requirement
 
 from tests.orchestrator.tiny import TINY, Place
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 MODULES = {"imageio-ffmpeg": "imageio_ffmpeg", "gymnasium-robotics": "gymnasium_robotics"}
 
 
