@@ -14,7 +14,7 @@ from analysis.page.profile import profile_markdown
 from analysis.paper.profile import profiles
 from analysis.results import check_results, provenance_text
 from analysis.run import Run, load_run
-from analysis.schema import PROVENANCE, SEGMENTS, SPEC
+from analysis.schema import PROVENANCE, QUARANTINE, SEGMENTS, SPEC
 from analysis.studies.data import undemonstrated, undemonstrated_note
 from analysis.studies.forecast import forecast_table
 from analysis.studies.models import model_table
@@ -41,10 +41,10 @@ def build_report(run_dir: Path) -> Path:
 def export_results(run_dir: Path, results_dir: Path, *, force: bool = False) -> list[Path]:
     """Writes each table of a run to `results_dir/<table id>/`; returns these folders.
 
-    With what was asked and every segment played, so that `open_run` reads such a folder like the
-    run itself, and anybody can work its numbers out again. Each takes the place of an older one in
-    one step, and nothing of that one stays. Rebuilds the report first: what is kept can then not be
-    older than the run. Raises RunError where a folder holds larger results, unless `force` is set.
+    With what was asked, every segment played and what was given up, so that `open_run` reads the
+    tables and gains off such a folder as off the run itself. Each takes the place of an older one
+    in one step, and nothing of that one stays. Rebuilds the report first: what is kept can then not
+    be older than the run. Raises RunError where a folder holds larger results, unless `force`.
     """
     run = load_run(run_dir)
     check_results(results_dir, [entry.id for entry in run.spec.tables], run.spec.extent, force)
@@ -57,7 +57,9 @@ def export_results(run_dir: Path, results_dir: Path, *, force: bool = False) -> 
         with replaced_folder(folder) as draft:
             _copy_table(name, report, studies, drawn, draft)
             _write(draft / PROVENANCE, provenance_text(run.provenance, run.spec.extent))
-            shutil.copyfile(run_dir / SPEC, draft / SPEC)
+            for file in (SPEC, QUARANTINE):
+                if (run_dir / file).is_file():
+                    shutil.copyfile(run_dir / file, draft / file)
             in_order = run.segments.sort_values(["seed", "method", "prefix", "episode"])
             in_order.to_parquet(draft / SEGMENTS, index=False)
         folders.append(folder)

@@ -208,3 +208,8 @@ def plain_label(skill: str) -> str:
 def task_length(task: str) -> int:
     """How many skills a task has."""
     return task.count(SEPARATOR) + 1
+
+
+def kind_of(showcase: Mapping[str, Any]) -> str:
+    """How a recording is drawn; those of earlier versions do not say it."""
+    return str(showcase.get("kind", "map" if "layout" in showcase else "physics"))

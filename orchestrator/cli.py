@@ -42,8 +42,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if error.name not in RUN_PACKAGES:
             raise
         ERRORS.print(
-            f"error: {error.name} is not installed; this command needs more than runs that are "
-            "there: pip install 'skillstitch[run]'",
+            f"error: {error.name} is not installed, and this command trains, plays or plans: "
+            "install skillstitch with its extra `run`, as in `pip install -e '.[run]'`",
             markup=False,
         )
         sys.exit(UsageError.exit_code)
@@ -173,6 +173,7 @@ def _report(words: list[str]) -> None:
 
 
 def _enjoy(words: list[str]) -> None:
+    from analysis.schema import SEPARATOR
     from orchestrator.film import film
     from orchestrator.replay import Asked
     from orchestrator.storage.rundir import RunDirectory
@@ -195,9 +196,9 @@ def _enjoy(words: list[str]) -> None:
             seed: whose models play.
             episode: its number, from 0; default: the first that accomplishes most.
             store: where the models are kept; default: where the run was last carried out.
-            out: the film; default: RUN/episodes/<task>-<method>-<seed>-<episode>.mp4.
+            out: the film; default: one in RUN/episodes/ with all this in its name.
         """
-        asked = Asked(tuple(task.split(">")), method, seed, episode)
+        asked = Asked(tuple(task.split(SEPARATOR)), method, seed, episode)
         for line in film(RunDirectory(run), asked, store, out):
             OUTPUT.print(line, markup=False)
 

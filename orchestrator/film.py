@@ -36,8 +36,9 @@ def film(
         f"{len(episode['segment'])} steps, exactly as on record"
     )
     spec = load_run_spec(directory.path)
-    name = f"{SEPARATOR.join(asked.task)}-{asked.method}-{asked.seed}-{shown['episode']}"
-    path = out or directory.path / "episodes" / f"{name.replace('/', '-')}.mp4"
+    parts = [*asked.task, asked.method, f"seed-{asked.seed}", f"episode-{shown['episode']}"]
+    name = "_".join(part.replace(" ", "-").replace("/", "-") for part in parts)
+    path = out or directory.path / "episodes" / f"{name}.mp4"
     with storage_errors(path.parent):
         path.parent.mkdir(parents=True, exist_ok=True)
         try:

@@ -1,4 +1,7 @@
-"""Reports written again, and tables kept with the code; needs nothing that trains or simulates."""
+"""Reports written again, and tables kept with the code.
+
+Those of single runs need nothing that trains or simulates; suites are merged by their specs.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,8 @@ from orchestrator.storage.rundir import RunDirectory
 def report_again(run: Path, results: Path | None, *, force: bool) -> Iterator[str]:
     """Write the report of a run or a suite from its segments; says what was written.
 
-    results, force: as of `export`. UsageError where there is no run.
+    results: also copy its tables, figures and report to RESULTS/<table>/. force: let them replace
+    larger ones. Raises UsageError where there is no run, or where they would without it.
     """
     directory = RunDirectory(run)
     suite = directory.is_suite
@@ -24,17 +28,14 @@ def report_again(run: Path, results: Path | None, *, force: bool) -> Iterator[st
             merge_again(directory)
         if results is None:
             build_report(run)
-    if results is not None:  # builds it, too
-        yield from export(run, results, force=force)
+        else:  # builds it, too
+            folders = export_results(run, results, force=force)
+            yield from (f"exported {folder}" for folder in folders)
     yield f"wrote {run / 'report' / 'index.html'}"
 
 
 def export(run: Path, results: Path, *, force: bool) -> Iterator[str]:
-    """Copy a run's tables, figures and report to RESULTS/<table>/; says where to.
-
-    force: let them replace larger ones. Raises RunError where they would without it.
-    """
+    """Copy a finished run's tables, figures and report; as `report_again` does, without a merge."""
     with RunDirectory(run).locked(), said_to_users():
         folders = export_results(run, results, force=force)
-    for folder in folders:
-        yield f"exported {folder}"
+    yield from (f"exported {folder}" for folder in folders)

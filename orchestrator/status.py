@@ -36,7 +36,7 @@ def _run_lines(directory: RunDirectory, store: Store) -> Iterator[str]:
     ledger.close()
     planned = directory.read_json(PLANNED)
     if planned is None:
-        yield f"  blocks     {len(finished)} played; another version planned it"
+        yield f"  blocks     {len(finished)} played; how many there will be is not known"
     else:
         artifacts = planned["artifacts"]
         built = sum((kind, key) in store for kind, key in artifacts)

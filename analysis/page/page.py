@@ -270,7 +270,7 @@ def _reading(run: Run, tables: list[Table]) -> str:
         "missed, nothing after it counts.",
         f"Intervals come from 1,000 resamples: {BOOTSTRAP}. A seed retrains everything and serves "
         "every task, so it is the unit that matters; tasks with a common beginning are the same "
-        "episodes for so long, so a thousand of them are no thousand witnesses. "
+        "episodes for so long, so they are not resampled one by one. "
         f"{seed_note(fewest)}",
         "Gains are paired: methods meet the same random numbers of the environment in the same "
         "(seed, task, episode), methods that do not stitch to first skills share those, and the "

@@ -30,7 +30,7 @@ class Illustration:
     """Something to look at that no score depends on, made last and by seed 0's models."""
 
     kind: str
-    inputs: tuple[str, ...]  # "agent", "dynamics", TEACHING, or roles of datasets and of `extras`
+    inputs: tuple[str, ...]  # kinds of models, TRAINING_DATA, or roles of datasets and `extras`
     task: tuple[str, ...] = ()  # played in it, where the spec has it; empty: none is
     pairs: int = 0  # at most, of skills that follow one another in the spec's tasks
     episodes: int = 0  # at most, of each such pair

@@ -1,7 +1,8 @@
 """What trained models are asked, and shown doing, for figures; no score depends on it.
 
-Apart from what makes data: an edit there would rename all that was learned from them. Studies are
-imported where they are made: what they import takes seconds, and plans have no use for it.
+Apart from what makes data: an edit there would rename all that was learned from them. The studies
+of models and of stitches are imported where they are made: scipy and torch take seconds, which a
+plan need not wait for.
 """
 
 from __future__ import annotations

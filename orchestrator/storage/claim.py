@@ -30,7 +30,8 @@ def claim_for_spec(directory: RunDirectory, spec: Spec) -> str:
     """
     plan = make_plan(spec)
     run_id = claim(directory, describe(spec), [plan], lambda: differences(spec_of(directory), spec))
-    directory.write_json(PLANNED, planned(plan))
+    if (now := planned(plan)) != directory.read_json(PLANNED):
+        directory.write_json(PLANNED, now)
     return run_id
 
 
@@ -69,7 +70,7 @@ def claim(
 def planned(plan: Plan) -> Plain:
     """What `skillstitch status` counts, which should not have to plan for it."""
     artifacts = [[recipe.kind, key] for key, recipe in plan.recipes.items()]
-    return {"artifacts": artifacts, "blocks": len(plan.tasks)}
+    return {"artifacts": artifacts, "blocks": len(plan.nodes) * len(plan.chunks)}
 
 
 def describe(spec: Spec) -> Plain:

@@ -79,7 +79,7 @@ def _of_run(directory: RunDirectory) -> set[str]:
     needed = _planned(spec_of(directory))
     # The run may have been made by other code, under which the same things had other names.
     ledger = directory.ledger(read_only=True)
-    needed |= ledger.artifacts() | ledger.finished()
+    needed |= ledger.artifacts().keys() | ledger.finished()
     ledger.close()
     return needed
 

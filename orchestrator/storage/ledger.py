@@ -36,7 +36,7 @@ COMMIT;
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a block's episodes did; arrays by name, one row an episode (see `worker.play`)."""
+    """What a block's episodes did: `BlockPlayer.outcome`'s arrays by name, a row an episode."""
 
     arrays: dict[str, np.ndarray]
 
@@ -177,10 +177,10 @@ class Ledger:
             ).fetchone()
         return str(known)
 
-    def artifacts(self) -> set[str]:
-        """Keys of all artifacts that blocks were played with."""
+    def artifacts(self) -> dict[str, str]:
+        """Key → digest, of all artifacts that blocks were played with."""
         with self._storage_errors():
-            return {key for (key,) in self._db.execute("SELECT key FROM artifacts")}
+            return dict(self._db.execute("SELECT key, digest FROM artifacts"))
 
     def record_failure(self, key: str, error: str) -> int:
         """Count a failed attempt at a block; returns how many there have been."""

@@ -20,6 +20,7 @@ from analysis.schema import (
     STITCHES,
     TRAINING,
     VARIANT,
+    kind_of,
     plain_label,
 )
 from orchestrator.benchmarks.registry import ENTRIES
@@ -27,6 +28,7 @@ from orchestrator.errors import UsageError
 from orchestrator.spec.methods import first_method, method_label, method_of
 from orchestrator.spec.structure import Plain, to_plain
 from orchestrator.spec.suite import Part, Suite, suite_of
+from orchestrator.storage.claim import IDENTITY
 from orchestrator.storage.rundir import RunDirectory
 
 SUMMED = ("counts", "seconds", "busy worker seconds")  # of the parts' provenance
@@ -79,7 +81,7 @@ def has_own_first_skill(suite: Suite, method: str) -> bool:
 
 
 def describe_suite(suite: Suite) -> Plain:
-    """spec.json of a suite, as `rundir.describe` writes a run's."""
+    """spec.json of a suite, as `claim.describe` writes a run's."""
     parts = [_describe_part(suite, part) for part in suite.parts]
     specs = [part.spec for part in suite.parts]
     limits: dict[str, int] = {}
@@ -194,7 +196,7 @@ def write_merged(suite: Suite, directory: RunDirectory, run_id: str) -> None:
 
 def merge_again(directory: RunDirectory) -> None:
     """Write a suite's files from what its parts have now. UsageError where nothing was played."""
-    identity = directory.read_json("identity.json")
+    identity = directory.read_json(IDENTITY)
     write_merged(suite_of(directory), directory, identity["run_id"])
 
 
@@ -266,7 +268,7 @@ def showcase_of_part(showcase: Plain, naming: Naming) -> Plain:
     renamed = showcase | {
         "episodes": [e | {"method": naming.method(e["method"])} for e in showcase["episodes"]]
     }
-    if "accomplished_by_all" not in showcase:
+    if kind_of(showcase) != "physics":
         return renamed
     for episode in renamed["episodes"]:
         episode["skill"] = [naming.skill(skill) for skill in episode["skill"]]

@@ -33,6 +33,8 @@ class RunDirectory:
     segments.parquet, episodes.parquet, training.json, datasets.json, report/
     showcase.json, diagnosis.json, stitches.json  what only figures need, where the benchmark has it
     quarantine.json   blocks that were given up
+    tracking.json     what MLflow has seen
+    episodes/         films of single episodes
     seconds.json      where the time of the last command that did any work went
     finished          there when all of the above is
     """

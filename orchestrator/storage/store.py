@@ -143,21 +143,22 @@ class Store:
 
     def checkpoints(self, key: str) -> Path:
         """Where trainings of an artifact may leave checkpoints: only who sees this store does."""
-        folder = self._checkpoints(key)
+        folder = self.checkpoint_folder(key)
         with storage_errors(self.root):
             folder.parent.mkdir(parents=True, exist_ok=True)
         return folder
 
     def drop_checkpoints(self, key: str) -> None:
         """Once the artifact is there they are of no use."""
-        shutil.rmtree(self._checkpoints(key), ignore_errors=True)
+        shutil.rmtree(self.checkpoint_folder(key), ignore_errors=True)
 
     def unfinished(self) -> Iterator[tuple[str, Path]]:
         """Keys of artifacts whose trainings have left checkpoints, and where."""
-        for folder in sorted(self._checkpoints("").glob("*")):
+        for folder in sorted(self.checkpoint_folder("").glob("*")):
             yield folder.name, folder
 
-    def _checkpoints(self, key: str) -> Path:
+    def checkpoint_folder(self, key: str) -> Path:
+        """The same, to look into; makes nothing."""
         return self.root.resolve() / "checkpoints" / key
 
     def artifacts(self) -> Iterator[tuple[str, str]]:

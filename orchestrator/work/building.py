@@ -57,24 +57,27 @@ class Trainings:
 
     store: Store
     recipes: Mapping[str, Recipe]  # by key
+    _since: float = field(default_factory=time.time)
     _before: dict[str, tuple[float, int]] = field(default_factory=dict)  # when, how many updates
 
     def told(self, keys: Iterable[str]) -> str:
         """In a few words; trainings whose checkpoints are not seen from here tell nothing."""
-        return ", ".join(filter(None, map(self._told, sorted(keys))))
+        return "; ".join(filter(None, map(self._told, sorted(keys))))
 
     def _told(self, key: str) -> str:
-        news, now = news_of(self.store.checkpoints(key)), time.monotonic()
+        news, now = news_of(self.store.checkpoint_folder(key), self._since), time.monotonic()
         if news is None:
             return ""
         recipe = self.recipes[key]
-        seed = f" seed {recipe.params['seed']}" if "seed" in recipe.params else ""
-        line = f"{recipe.kind}{seed} {news.done:,} of {news.updates:,} updates"
-        then, done = self._before.setdefault(key, (now, news.done))
+        seed = f", seed {recipe.params['seed']}" if "seed" in recipe.params else ""
+        line = f"{recipe.kind}{seed}: {news.done:,} of {news.updates:,} updates"
+        then, done = self._before.get(key, (now, news.done))
         if news.done > done:
             line += f" ({(news.done - done) / (now - then):.0f}/s)"
+        if not done < news.done < news.updates:  # the first look, or another attempt
+            self._before[key] = now, news.done
         losses = [f"{name} {value:.3g}" for name, value in news.losses.items()]
-        return " ".join([line, *losses[:1]])
+        return ", ".join([line, *losses[:1]])
 
 
 @dataclass

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import time
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,6 +28,8 @@ from stitching.streams import Label
 
 FORMAT = 1
 """Of the files: those of another one count as none."""
+
+SECONDS_BETWEEN_NEWS = 2.0
 
 NEWS = ".news"
 """Ends the name of a file that tells how far a training is."""
@@ -65,12 +69,13 @@ class Checkpoints:
         return self.earlier + time.perf_counter() - self._started
 
 
-@dataclass(frozen=True)
+@dataclass
 class CheckpointFile:
-    """A digest, then tensors and what is plain."""
+    """A digest, then tensors and what is plain; beside it, how far the training is."""
 
     path: Path
     build: Checkpoints  # whose it is
+    _told: float = -math.inf  # when, on the monotonic clock
 
     def write(self, tensors: dict[str, torch.Tensor], plain: dict[str, Any]) -> None:
         """Replace the file whole; a disk that refuses costs the checkpoint alone."""
@@ -81,8 +86,15 @@ class CheckpointFile:
         with suppress(OSError, StorageError):
             write_atomically(self.path, _digest(data) + data)
 
-    def tell(self, done: int, updates: int, losses: dict[str, float]) -> None:
-        """Beside the checkpoint; where the disk refuses, nobody is told."""
+    def tell(
+        self, done: int, updates: int, curves: Mapping[str, Sequence[tuple[int, float]]]
+    ) -> None:
+        """Now and then, and at the end; where the disk refuses, nobody is told."""
+        now = time.monotonic()
+        if done < updates and now - self._told < SECONDS_BETWEEN_NEWS:
+            return
+        self._told = now
+        losses = {name: curve[-1][1] for name, curve in curves.items() if curve}
         news = {"done": done, "updates": updates, "losses": losses}
         with suppress(OSError):
             self.path.parent.mkdir(exist_ok=True)
@@ -114,12 +126,17 @@ class News:
     losses: dict[str, float]  # recorded last, of the one that is under way
 
 
-def news_of(folder: Path) -> News | None:
-    """What the trainings that keep checkpoints in a folder tell; None where they tell nothing."""
+def news_of(folder: Path, since: float = 0.0) -> News | None:
+    """What the trainings that keep checkpoints in a folder tell; None where they tell nothing.
+
+    since: seconds of the epoch; what was told before is of an attempt that has ended.
+    """
     told = []
-    for file in sorted(folder.glob(f"*{NEWS}")):
-        with suppress(OSError, ValueError):  # it is being written, or is gone
-            told.append((file.stat().st_mtime, json.loads(file.read_text())))
+    with suppress(OSError):  # the folder goes once the artifact is there
+        for file in sorted(folder.glob(f"*{NEWS}")):
+            with suppress(OSError, ValueError):  # it is being written, or is gone
+                if (when := file.stat().st_mtime) >= since:
+                    told.append((when, json.loads(file.read_text())))
     if not told:
         return None
     _, newest = max(told, key=lambda news: news[0])

@@ -48,7 +48,7 @@ class Evaluation:
                 self._expand(root, chunk)
         if self._ready:
             self._provide_models()
-        with self.progress.watching(lambda: f"{self._in_flight} jobs under way"):
+        with self.progress.watching(lambda: f"{self._in_flight} groups of blocks under way"):
             while self._ready or self._in_flight:
                 self._dispatch()
                 self._receive(self.executor.next())

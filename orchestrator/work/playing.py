@@ -42,10 +42,6 @@ class BlockPlayer:
                 reports.append(BlockReport(task.key, None, traceback.format_exc(limit=-3)))
         return Report(job, blocks=tuple(reports), seconds=time.perf_counter() - started)
 
-    def policy(self, task: BlockTask, artifacts: Mapping[str, Artifact]) -> Agent:
-        """What executes the skills of a block."""
-        return self._models_of(task, artifacts).one(method_of(task.method).policy, Agent)
-
     def outcome(
         self,
         task: BlockTask,
@@ -56,7 +52,8 @@ class BlockPlayer:
         """What one block's episodes do; a recorder changes nothing. Artifacts by key."""
         benchmark = BENCHMARKS[task.benchmark]
         method = method_of(task.method)
-        models = self._models_of(task, artifacts)
+        trained = {kind: self._model(task, kind, artifacts) for kind in task.artifacts}
+        models = Models(benchmark.actions, len(benchmark.skills), trained)
         agent = models.one(method.policy, Agent)
         stitcher = method.stitcher(task.settings, models)
         episodes, used, snapshots = survivors(task, parent)
@@ -80,11 +77,6 @@ class BlockPlayer:
                 "snapshots": segments.snapshots[segments.success],
             }
         )
-
-    def _models_of(self, task: BlockTask, artifacts: Mapping[str, Artifact]) -> Models:
-        benchmark = BENCHMARKS[task.benchmark]
-        trained = {kind: self._model(task, kind, artifacts) for kind in task.artifacts}
-        return Models(benchmark.actions, len(benchmark.skills), trained)
 
     def _env(self, task: BlockTask) -> VectorEnv:
         place = task.benchmark, method_of(task.method).policy

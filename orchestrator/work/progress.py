@@ -115,7 +115,10 @@ class ConsoleProgress:
 
         def watch() -> None:
             while not ended.wait(SECONDS_BETWEEN_LOOKS):
-                under_way = look()
+                try:
+                    under_way = look()
+                except Exception:  # what is told of the work must not disturb it
+                    under_way = ""
                 if self._task is not None:
                     self._bar.update(self._task, under_way=under_way)
                 self._tell(under_way)

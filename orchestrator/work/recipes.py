@@ -173,7 +173,7 @@ def _file_of(module: str) -> Path | None:
     if package is None or not package.submodule_search_locations:
         return None
     path = Path(package.submodule_search_locations[0]).joinpath(*module.split(".")[1:])
-    candidates = (path.with_name(f"{path.name}.py"), path / "__init__.py")
+    candidates = (path / "__init__.py", path.with_name(f"{path.name}.py"))
     return next((file for file in candidates if file.is_file()), None)
 
 

@@ -19,29 +19,29 @@ class FirstTimes:
     """
 
     def __init__(self, env: VectorEnv, skills: int) -> None:
-        self._env, self._skills = env, skills
+        self.inner, self._skills = env, skills
         self._before = np.zeros((0, skills), dtype=bool)  # (N, skills) what held until this segment
         self._held = self._before  # (N, skills) and until now
 
     def reset(self, streams: Sequence[np.random.Generator]) -> None:
-        self._env.reset(streams)
+        self.inner.reset(streams)
         self._before = self._holding(np.arange(len(streams)))
         self._held = self._before.copy()
 
     def restore(self, snapshots: np.ndarray, streams: Sequence[np.random.Generator]) -> None:
         inner, held = np.split(snapshots, [-self._skills], axis=1)
-        self._env.restore(inner, streams)
+        self.inner.restore(inner, streams)
         self._before = held.astype(bool)
         self._held = self._before.copy()
 
     def snapshot(self, rows: np.ndarray) -> np.ndarray:
-        return np.hstack([self._env.snapshot(rows), self._held[rows]])
+        return np.hstack([self.inner.snapshot(rows), self._held[rows]])
 
     def observe(self, rows: np.ndarray) -> np.ndarray:
-        return self._env.observe(rows)
+        return self.inner.observe(rows)
 
     def step(self, rows: np.ndarray, actions: np.ndarray) -> None:
-        self._env.step(rows, actions)
+        self.inner.step(rows, actions)
         self._held[rows] |= self._holding(rows)
 
     def achieved(self, rows: np.ndarray, skill: int) -> np.ndarray:
@@ -49,4 +49,4 @@ class FirstTimes:
 
     def _holding(self, rows: np.ndarray) -> np.ndarray:
         """Which goals hold now: (n, skills) bool."""
-        return np.stack([self._env.achieved(rows, skill) for skill in range(self._skills)], axis=1)
+        return np.stack([self.inner.achieved(rows, skill) for skill in range(self._skills)], axis=1)

@@ -5,7 +5,7 @@ Who starts trainings says how checkpoints are kept, with `checkpoints_by`. Witho
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any, Protocol
@@ -21,8 +21,10 @@ class Checkpoint(Protocol):
     def write(self, tensors: dict[str, torch.Tensor], plain: dict[str, Any]) -> None:
         """Replace what was kept; arrays in `plain` may come back as lists."""
 
-    def tell(self, done: int, updates: int, losses: dict[str, float]) -> None:
-        """How far the training is, for a person who waits; nothing depends on it."""
+    def tell(
+        self, done: int, updates: int, curves: Mapping[str, Sequence[tuple[int, float]]]
+    ) -> None:
+        """How far the training is, after every update; nothing that is learned depends on it."""
 
     def read(self) -> tuple[dict[str, torch.Tensor], dict[str, Any]] | None:
         """What was written last; None where there is nothing, or nothing whole."""

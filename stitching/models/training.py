@@ -17,7 +17,6 @@ DRAWN_AT_ONCE = 256
 """Minibatches may be drawn this many at once; a checkpoint lies between two such draws."""
 
 SECONDS_BETWEEN_CHECKPOINTS = 60.0
-SECONDS_BETWEEN_NEWS = 2.0
 
 Curves = dict[str, list[tuple[int, float]]]
 
@@ -40,11 +39,6 @@ class CurveLog:
     updates: int
     every: int
     curves: Curves = field(default_factory=dict)
-
-    @property
-    def latest(self) -> dict[str, float]:
-        """The value recorded last, by name."""
-        return {name: curve[-1][1] for name, curve in self.curves.items()}
 
     def record(self, update: int, values: dict[str, torch.Tensor]) -> None:
         done = update + 1
@@ -80,16 +74,14 @@ class Training:
         """
         checkpoint = checkpoint_of(self.labels)
         first = self._go_on(checkpoint) if checkpoint else 0
-        kept = told = time.monotonic()
+        kept = time.monotonic()
         for update in range(first, self.log.updates):
             yield update
             if checkpoint is None:
                 continue
-            done, now = update + 1, time.monotonic()
-            if now - told >= SECONDS_BETWEEN_NEWS:
-                checkpoint.tell(done, self.log.updates, self.log.latest)
-                told = now
-            due = now - kept >= SECONDS_BETWEEN_CHECKPOINTS
+            done = update + 1
+            checkpoint.tell(done, self.log.updates, self.log.curves)
+            due = time.monotonic() - kept >= SECONDS_BETWEEN_CHECKPOINTS
             if due and (done % DRAWN_AT_ONCE == 0 or done == self.log.updates):
                 self._keep(checkpoint, done)
                 kept = time.monotonic()

@@ -21,7 +21,7 @@ from stitching.envs.protocol import ActionSpace
 from stitching.planning.protocol import PlannedActions, Score
 from stitching.planning.ranking import sortable
 
-SMALLEST = 1e-3  # share of the weights that not the best elite has, below which it is alone
+SMALLEST = 1e-3  # where all elites but the best have less of the weight together, it has all
 
 
 @dataclass(frozen=True)

@@ -224,7 +224,7 @@ class BenchmarkConformance:
             some.step(np.arange(2), actions[survivors])
         assert look(benchmark, some, np.arange(2)) == look(benchmark, everyone, survivors)
 
-    def test_a_block_of_nobody(self, benchmark: Benchmark) -> None:
+    def test_an_environment_without_episodes(self, benchmark: Benchmark) -> None:
         env = benchmark.vector_env()
         env.reset([])
         assert env.observe(ROWS[:0]).shape == (0, benchmark.observation_size)

@@ -67,7 +67,12 @@ def test_only_common_episodes_count(
     ],
 )
 def test_says_why_nothing_can_be_compared(
-    run_a: Path, tmp_path: Path, spec_dict: Callable[..., dict[str, Any]], write_run: Callable[..., Path], change: Any, reason: str
+    run_a: Path,
+    tmp_path: Path,
+    spec_dict: Callable[..., dict[str, Any]],
+    write_run: Callable[..., Path],
+    change: Any,
+    reason: str,
 ) -> None:
     run_b = write_run(tmp_path / "b", spec={**spec_dict(), **change})
     with pytest.raises(NothingToCompareError, match=reason):
@@ -91,7 +96,11 @@ ASKED = {
     ids=["root seed", "benchmark"],
 )
 def test_other_random_numbers_are_not_paired(
-    tmp_path: Path, spec_dict: Callable[..., dict[str, Any]], write_run: Callable[..., Path], what: dict[str, Any], message: str
+    tmp_path: Path,
+    spec_dict: Callable[..., dict[str, Any]],
+    write_run: Callable[..., Path],
+    what: dict[str, Any],
+    message: str,
 ) -> None:
     """Between runs, between merged runs, and between a run and a merged one."""
     asked = [(plain, {"parts": [{"label": "x", "spec": plain}]}) for plain in (ASKED, ASKED | what)]
@@ -109,7 +118,9 @@ def test_other_random_numbers_are_not_paired(
         assert len(compare(run_a, runs[0][0])) == 12
 
 
-def test_fields_that_differ_are_listed(tmp_path: Path, spec_dict: Callable[..., dict[str, Any]], write_run: Callable[..., Path]) -> None:
+def test_fields_that_differ_are_listed(
+    tmp_path: Path, spec_dict: Callable[..., dict[str, Any]], write_run: Callable[..., Path]
+) -> None:
     other = ASKED | {"mb_stitch": {"alpha": 5.0, "cem": {"horizon": 5}}, "new": True}
     run_a = write_run(tmp_path / "a", spec=spec_dict() | {"spec": ASKED})
     run_b = write_run(tmp_path / "b", spec=spec_dict() | {"spec": other})

@@ -62,7 +62,11 @@ def play_slowly(
     max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(data=st.data())
-def test_agrees_with_the_slow_loop(data: Any, segments_of: Callable[[dict[str, Any]], pd.DataFrame], spec_dict: Callable[..., dict[str, Any]]) -> None:
+def test_agrees_with_the_slow_loop(
+    data: Any,
+    segments_of: Callable[[dict[str, Any]], pd.DataFrame],
+    spec_dict: Callable[..., dict[str, Any]],
+) -> None:
     """For any lengths, step limits, and whatever blocks are missing."""
     lengths = data.draw(st.sets(st.integers(1, 4), min_size=1, max_size=2))
     raw = spec_dict(seeds=2, episodes=3, lengths=tuple(sorted(lengths)))
@@ -155,7 +159,9 @@ def test_quarantine_of_what_nobody_asked_for_is_ignored(toy: Any) -> None:
     assert set(counts(episodes_from_segments(segments, narrow, quarantine)).values()) == {4}
 
 
-def test_a_lost_first_skill_takes_every_method_with_it(segments: pd.DataFrame, spec: RunSpec) -> None:
+def test_a_lost_first_skill_takes_every_method_with_it(
+    segments: pd.DataFrame, spec: RunSpec
+) -> None:
     whole = episodes_from_segments(segments, spec)
     lost = segments.query("not (prefix == 'g0' and seed == 1 and episode == 3)")
     left_out = whole.query("task.str.startswith('g0') and seed == 1 and episode == 3")
@@ -182,7 +188,9 @@ def test_a_method_may_have_first_skills_of_its_own(segments: pd.DataFrame, spec:
     assert scores["mb-stitch"] > 0.9
 
 
-def test_until_they_are_played_such_a_method_has_no_episodes(segments: pd.DataFrame, spec: RunSpec) -> None:
+def test_until_they_are_played_such_a_method_has_no_episodes(
+    segments: pd.DataFrame, spec: RunSpec
+) -> None:
     """It must not borrow the shared first skills."""
     own = replace(spec, own_first_skill=frozenset({"no-stitch"}))
     episodes = episodes_from_segments(segments.query("method != 'no-stitch'"), own)
@@ -194,7 +202,9 @@ def test_a_segment_given_twice_is_refused(segments: pd.DataFrame, spec: RunSpec)
         episodes_from_segments(pd.concat([segments, segments[:1]]), spec)
 
 
-def test_the_file_has_reproducible_bytes(tmp_path: Path, segments: pd.DataFrame, write_run: Callable[..., Path]) -> None:
+def test_the_file_has_reproducible_bytes(
+    tmp_path: Path, segments: pd.DataFrame, write_run: Callable[..., Path]
+) -> None:
     shuffled = segments.sample(frac=1, random_state=1)
     paths = [
         write_run(tmp_path / name, segments=rows)

@@ -83,7 +83,9 @@ def test_without_a_picture_the_report_is_written_and_says_why(
     assert not (folder / "figures" / "contact-sheet.png").exists()
 
 
-def test_a_run_that_has_only_begun_can_be_reported(tmp_path: Path, write_run: Callable[..., Path]) -> None:
+def test_a_run_that_has_only_begun_can_be_reported(
+    tmp_path: Path, write_run: Callable[..., Path]
+) -> None:
     run_dir = write_kitchen(write_run, tmp_path / "run", showcase=None)
     segments = pd.read_parquet(run_dir / "segments.parquet")
     segments.query("depth == 1").to_parquet(run_dir / "segments.parquet", index=False)

@@ -1,5 +1,5 @@
-from collections.abc import Callable
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +35,11 @@ def test_exports_what_is_kept_with_the_code(exported: Path) -> None:
 
 
 def test_the_same_run_gives_the_same_bytes(
-    run_dir: Path, exported: Path, tmp_path: Path, segments: pd.DataFrame, write_run: Callable[..., Path]
+    run_dir: Path,
+    exported: Path,
+    tmp_path: Path,
+    segments: pd.DataFrame,
+    write_run: Callable[..., Path],
 ) -> None:
     """Wherever the run lies, and in whatever order its segments were written."""
     elsewhere = write_run(tmp_path / "other", segments=segments[::-1])
@@ -52,7 +56,9 @@ def test_the_page_is_self_contained(run_dir: Path, exported: Path) -> None:
     assert str(run_dir) not in page
 
 
-def test_a_partial_run_is_reported_as_such(tmp_path: Path, segments: pd.DataFrame, write_run: Callable[..., Path]) -> None:
+def test_a_partial_run_is_reported_as_such(
+    tmp_path: Path, segments: pd.DataFrame, write_run: Callable[..., Path]
+) -> None:
     """Quarantined blocks are named; without the optional files the page simply lacks parts."""
     lost = segments.query("not (method == 'mb-stitch' and prefix == 'g0>g1' and seed == 2)")
     block = {
@@ -103,7 +109,9 @@ def test_a_run_that_has_only_begun_can_be_reported(
     assert pd.read_parquet(tmp_path / "run" / "episodes.parquet").empty
 
 
-def test_names_cannot_break_out_of_the_page(tmp_path: Path, spec_dict: Callable[..., dict[str, Any]], write_run: Callable[..., Path]) -> None:
+def test_names_cannot_break_out_of_the_page(
+    tmp_path: Path, spec_dict: Callable[..., dict[str, Any]], write_run: Callable[..., Path]
+) -> None:
     spec = {**spec_dict(), "title": "<script>alert(1)</script>"}
     spec["skill_labels"] = {"g0": "</script><b>"}
     page = build_report(write_run(tmp_path / "run", spec=spec)).read_text(encoding="utf-8")

@@ -2,7 +2,7 @@
 
 import os
 import shutil
-from collections.abc import Iterator, Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 

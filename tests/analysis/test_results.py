@@ -1,7 +1,7 @@
 """Results kept with the code: none is lost to a smaller run, or to a folder that takes nothing."""
 
-from collections.abc import Callable
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -80,7 +80,18 @@ def test_an_export_is_read_like_the_run(tmp_path: Path, write_run: Callable[...,
     pd.testing.assert_frame_equal(kept_ones.scores("table1"), ours.scores("table1"))
 
 
-def test_an_export_says_its_extent_and_keeps_to_it(tmp_path: Path, write_run: Callable[..., Path]) -> None:
+def test_what_was_given_up_is_exported_too(tmp_path: Path, write_run: Any) -> None:
+    """Without it a block that was given up would count as one that nobody survived to."""
+    lost = [{"method": "mb-stitch", "seed": 2, "prefix": "g0>g1", "episodes": [3], "error": "x"}]
+    run_dir = write_run(tmp_path / "run", training=None, showcase=None, quarantine=lost)
+    (folder,) = export_results(run_dir, tmp_path / "results")
+    ours, kept_ones = open_run(run_dir), open_run(folder)
+    pd.testing.assert_frame_equal(kept_ones.episodes, ours.episodes)
+
+
+def test_an_export_says_its_extent_and_keeps_to_it(
+    tmp_path: Path, write_run: Callable[..., Path]
+) -> None:
     run_dir = write_run(tmp_path / "run", training=None, showcase=None)
     (folder,) = export_results(run_dir, tmp_path / "results")
     extent = extent_of(folder)

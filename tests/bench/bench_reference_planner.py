@@ -177,11 +177,11 @@ def measure(run: Path | None) -> Iterator[Result]:
     ours, theirs = Totals(), [Totals() for _ in there]
     with torch.inference_mode():
         _warm_up(setting, there)
-        for number, block in enumerate(setting.blocks):
-            score = setting.exact.score(block.states, block.following)
-            _ours(ours, setting.product, block, score, number)
+        for number, problems in enumerate(setting.blocks):
+            score = setting.exact.score(problems.states, problems.following)
+            _ours(ours, setting.product, problems, score, number)
             for reference, totals in zip(there, theirs, strict=True):
-                _theirs(totals, reference, block, score, number)
+                _theirs(totals, reference, problems, score, number)
     for reference, totals in zip(there, theirs, strict=True):
         yield from _compared(setting.title, ours, reference.title, totals)
 
@@ -197,11 +197,11 @@ def _installed() -> Iterator[Reference]:
             print(f"{'reference':<12}no {reference.title}: {reference.install}")
 
 
-def _ours(totals: Totals, product: MBStitch, block: Problems, exact: Score, number: int) -> None:
-    streams = [stream("planner", SEED, number, row) for row in range(len(block.states))]
+def _ours(totals: Totals, product: MBStitch, problems: Problems, exact: Score, number: int) -> None:
+    streams = [stream("planner", SEED, number, row) for row in range(len(problems.states))]
     began = process_time()
     # What `propose` does before it keeps the first action.
-    score = product.score(block.states, block.following)
+    score = product.score(problems.states, problems.following)
     plan = product.settings.chosen.plan(score, streams, product.models.actions)
     totals.seconds += process_time() - began
     totals.iterations += plan.iterations.tolist()
@@ -212,11 +212,11 @@ def _ours(totals: Totals, product: MBStitch, block: Problems, exact: Score, numb
 
 
 def _theirs(
-    totals: Totals, reference: Reference, block: Problems, score: Score, number: int
+    totals: Totals, reference: Reference, problems: Problems, score: Score, number: int
 ) -> None:
-    for row in range(len(block.states)):
+    for row in range(len(problems.states)):
         objective = partial(_of_one, score, torch.tensor([row]))
-        torch.manual_seed(number * len(block.states) + row)
+        torch.manual_seed(number * len(problems.states) + row)
         began = process_time()
         actions = reference.plan(objective, LIMITS.iterations)
         totals.seconds += process_time() - began
@@ -236,11 +236,11 @@ def _gain(objective: Objective, plan: Tensor) -> float:
 
 def _warm_up(setting: Setting, references: list[Reference]) -> None:
     """Imports and first calls, which no run pays for every plan."""
-    block = setting.blocks[0]
+    problems = setting.blocks[0]
     settings = with_sections(setting.product.settings, replace(LIMITS, iterations=2))
     product = replace(setting.product, settings=settings)
-    score = setting.exact.score(block.states, block.following)
-    _ours(Totals(), product, block, score, 0)
+    score = setting.exact.score(problems.states, problems.following)
+    _ours(Totals(), product, problems, score, 0)
     for reference in references:
         reference.plan(partial(_of_one, score, torch.tensor([0])), 2)
 

@@ -6,11 +6,13 @@ from pathlib import Path
 import imageio_ffmpeg
 import numpy as np
 import pytest
+import torch
 
-from orchestrator.errors import NondeterminismError, UsageError
+from orchestrator.errors import ChangedError, NondeterminismError, UsageError
 from orchestrator.film import film
 from orchestrator.replay import Asked, replay
 from orchestrator.spec.spec import Spec
+from orchestrator.storage.store import Artifact
 from orchestrator.work.plan import Plan
 from tests.orchestrator.tiny import Place
 
@@ -69,9 +71,9 @@ def test_a_task_of_one_skill_may_be_shared(trained: Place, spec: Spec) -> None:
     ("asked", "told"),
     [
         (Asked(("g3", "g0"), "no-stitch"), "has no task 'g3>g0'; it has g0>g1"),
-        (Asked(TASK, "reach-stitch"), "there are no-stitch, random-stitch"),
-        (Asked(TASK, "no-stitch", seed=2), "there are 2, from 0"),
-        (Asked(TASK, "no-stitch", episode=6), "there are 6, from 0"),
+        (Asked(TASK, "reach-stitch"), "has no method 'reach-stitch'; it has no-stitch"),
+        (Asked(TASK, "no-stitch", seed=2), "has no seed 2; they go from 0 to 1"),
+        (Asked(TASK, "no-stitch", episode=6), "has no episode 6; they go from 0 to 5"),
     ],
 )
 def test_what_is_not_there_is_said(finished: Place, asked: Asked, told: str) -> None:
@@ -87,6 +89,34 @@ def test_what_was_not_played_is_said(done: Place, plan: Plan) -> None:
         replay(done.directory, Asked(TASK, "no-stitch", episode=0))
 
 
+def test_a_model_that_is_not_there_is_named(done: Place, plan: Plan, tmp_path: Path) -> None:
+    asked = Asked(TASK, "no-stitch", episode=0)
+    with pytest.raises(UsageError, match=r"no store at .*nowhere"):
+        replay(done.directory, asked, tmp_path / "nowhere")
+    assert not (tmp_path / "nowhere").exists()
+    key = plan.by_seed("agent")[0]
+    done.store.discard("agent", key)
+    with pytest.raises(UsageError, match=f"has no agent {key}: name the store with --store"):
+        replay(done.directory, asked, done.store_root)
+
+
+def test_another_model_is_refused(done: Place, plan: Plan) -> None:
+    key = plan.by_seed("agent")[0]
+    real = done.store.read("agent", key)
+    done.store.discard("agent", key)
+    weights = {name: array + 1 for name, array in real.arrays.items()}
+    done.store.write("agent", key, Artifact(weights, real.info), {})
+    with pytest.raises(ChangedError, match="has other bytes than the one that"):
+        replay(done.directory, Asked(TASK, "no-stitch", episode=0), done.store_root)
+
+
+def test_the_threads_of_the_caller_are_as_before(finished: Place) -> None:
+    torch.set_num_threads(2)
+    replay(finished.directory, Asked(TASK, "no-stitch", episode=0))
+    assert torch.get_num_threads() == 2
+    torch.set_num_threads(1)
+
+
 def test_another_outcome_is_an_error(done: Place, plan: Plan) -> None:
     asked = Asked(TASK, "no-stitch", episode=0)
     key = next(
@@ -100,7 +130,7 @@ def test_another_outcome_is_an_error(done: Place, plan: Plan) -> None:
     outcome.arrays["steps"] = outcome.arrays["steps"] + 1
     ledger.record([(key, outcome.to_bytes())])
     ledger.close()
-    with pytest.raises(NondeterminismError, match="something else than what is on record"):
+    with pytest.raises(NondeterminismError, match="something else here than on record"):
         replay(done.directory, asked)
 
 
@@ -119,7 +149,7 @@ def test_a_film_has_a_frame_a_step(finished: Place, tmp_path: Path) -> None:
 
 def test_a_film_lies_with_its_run(done: Place) -> None:
     told = list(film(done.directory, Asked(TASK, "no-stitch", episode=1)))
-    path = done.out / "episodes" / "g0>g3-no-stitch-0-1.mp4"
+    path = done.out / "episodes" / "g0_g3_no-stitch_seed-0_episode-1.mp4"
     assert path.is_file()
     assert str(path) in told[-1]
 

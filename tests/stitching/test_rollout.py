@@ -48,7 +48,7 @@ each_method = pytest.mark.parametrize("method", METHODS)
 each_reading = pytest.mark.parametrize("config", [SAMPLED, FIRST], ids=["between", "first"])
 
 
-def play_of(method: str, prefix: Sequence[str], episodes: Sequence[int] = range(6)) -> Block:
+def block_of(method: str, prefix: Sequence[str], episodes: Sequence[int] = range(6)) -> Block:
     return Block(0, "maze", 0, method, tuple(episodes), tuple(prefix))
 
 
@@ -144,7 +144,7 @@ def test_the_tree_gives_the_bytes_of_playing_each_task_alone(
 ) -> None:
     tree = Tree(maze, agent, stitchers, config)
     for task in TASKS:
-        block = play_of(method, task, episodes)
+        block = block_of(method, task, episodes)
         alone = play_from_start(
             maze.vector_env(), agent, stitchers[method], maze, config, block, STEP_LIMIT
         )
@@ -161,7 +161,7 @@ def test_a_policy_told_of_no_skill_is_played_alike(
     tree.env = FirstTimes(maze.vector_env(), skills)
     ahead = 0
     for task in TASKS:
-        block = play_of("no-stitch", task, range(16))
+        block = block_of("no-stitch", task, range(16))
         env = FirstTimes(maze.vector_env(), skills)
         alone = play_from_start(env, unconditioned, NoStitch(), maze, SAMPLED, block, STEP_LIMIT)
         assert [raw(s) for s in alone] == [raw(s) for s in tree.task(block, STEP_LIMIT)]
@@ -180,10 +180,10 @@ def test_a_whole_tree_gives_the_bytes_of_every_task(
     names = [skill.name for skill in maze.skills]
     for length in (2, 1, 3):
         for prefix in permutations(reversed(names), length):
-            tree.task(play_of(method, prefix), STEP_LIMIT)
+            tree.task(block_of(method, prefix), STEP_LIMIT)
     reached: Counter[tuple[int, bool]] = Counter()
     for task in permutations(names, 3):
-        block = play_of(method, task)
+        block = block_of(method, task)
         alone = play_from_start(
             maze.vector_env(), agent, stitchers[method], maze, SAMPLED, block, STEP_LIMIT
         )
@@ -197,7 +197,7 @@ def test_a_first_skill_is_stitched_to_where_the_method_can(
     maze: Maze, agent: Agent, stitchers: dict[str, Stitcher], method: str
 ) -> None:
     def first(config: RolloutConfig) -> Segments:
-        block = play_of(method, TASKS[0][:1], range(12))
+        block = block_of(method, TASKS[0][:1], range(12))
         (segments,) = play_from_start(
             maze.vector_env(), agent, stitchers[method], maze, config, block, STEP_LIMIT
         )
@@ -215,7 +215,7 @@ def test_a_first_skill_is_stitched_to_where_the_method_can(
 def test_shorter_limits_can_be_read_off_the_longest(
     maze: Maze, agent: Agent, stitchers: dict[str, Stitcher], method: str
 ) -> None:
-    block = play_of(method, TASKS[2], range(12))
+    block = block_of(method, TASKS[2], range(12))
     decided = set()
 
     def end_steps(step_limit: int) -> dict[tuple[int, int], int]:
@@ -244,7 +244,7 @@ def test_an_episode_does_not_depend_on_its_company(
     maze: Maze, agent: Agent, stitchers: dict[str, Stitcher], method: str
 ) -> None:
     """To the rounding of batched products: bytes are promised for equal blocks alone."""
-    block = play_of(method, TASKS[0], [7, 3, 11])
+    block = block_of(method, TASKS[0], [7, 3, 11])
     together = play_from_start(
         maze.vector_env(), agent, stitchers[method], maze, SAMPLED, block, STEP_LIMIT
     )
@@ -263,12 +263,12 @@ import pickle, sys
 import torch
 from stitching.rollout import play_from_start
 torch.set_num_threads(1)
-maze, agent, stitchers, config, plays, step_limit = pickle.load(sys.stdin.buffer)
+maze, agent, stitchers, config, blocks, step_limit = pickle.load(sys.stdin.buffer)
 outcomes = [
     play_from_start(
-        maze.vector_env(), agent, stitchers[play.method], maze, config, play, step_limit
+        maze.vector_env(), agent, stitchers[block.method], maze, config, block, step_limit
     )
-    for play in plays
+    for block in blocks
 ]
 pickle.dump(outcomes, sys.stdout.buffer)
 """
@@ -277,17 +277,17 @@ pickle.dump(outcomes, sys.stdout.buffer)
 def test_another_process_gives_the_same_bytes(
     maze: Maze, agent: Agent, stitchers: dict[str, Stitcher]
 ) -> None:
-    plays = [play_of(method, task) for method in METHODS for task in TASKS[:3]]
+    blocks = [block_of(method, task) for method in METHODS for task in TASKS[:3]]
     here = [
         play_from_start(
             maze.vector_env(), agent, stitchers[block.method], maze, SAMPLED, block, STEP_LIMIT
         )
-        for block in plays
+        for block in blocks
     ]
-    plays_backwards = plays[::-1]  # the order in which a worker gets its work is nobody's promise
+    blocks_backwards = blocks[::-1]  # the order in which a worker gets its work is nobody's promise
     worker = subprocess.run(
         [sys.executable, "-c", IN_ANOTHER_PROCESS],
-        input=pickle.dumps((maze, agent, stitchers, SAMPLED, plays_backwards, STEP_LIMIT)),
+        input=pickle.dumps((maze, agent, stitchers, SAMPLED, blocks_backwards, STEP_LIMIT)),
         env={**os.environ, "PYTHONHASHSEED": "7"},
         capture_output=True,
         check=True,
@@ -333,7 +333,7 @@ def test_no_episode_takes_more_than_its_budget(
     stitcher = stitchers[method]
     config = replace(SAMPLED, skill_limit=skill_limit)
     previous = "a" if skill != "a" else "b"
-    block = play_of(method, (previous, skill), range(len(cells)))
+    block = block_of(method, (previous, skill), range(len(cells)))
     outcome, log, ends = segment(maze, agent, stitcher, config, block, budget, cells)
 
     assert (outcome.steps <= budget).all()
@@ -362,7 +362,7 @@ def test_a_task_stays_within_its_step_limit(
     for task in TASKS:
         log = Log()
         played = play_from_start(
-            maze.vector_env(), agent, stitchers[method], maze, SAMPLED, play_of(method, task),
+            maze.vector_env(), agent, stitchers[method], maze, SAMPLED, block_of(method, task),
             step_limit, log,
         )  # fmt: skip
         used = np.zeros(6, dtype=np.int64)
@@ -380,7 +380,7 @@ def test_first_skills_are_not_stitched(
 ) -> None:
     def first(stitcher: Stitcher, name: str) -> Segments:
         (segments,) = play_from_start(
-            maze.vector_env(), agent, stitcher, maze, SAMPLED, play_of(name, ("b",)), STEP_LIMIT
+            maze.vector_env(), agent, stitcher, maze, SAMPLED, block_of(name, ("b",)), STEP_LIMIT
         )
         return segments
 
@@ -395,7 +395,7 @@ def random_stitch(actions: ActionSpace, limit: int) -> RandomStitch:
 
 
 def test_a_limit_of_0_is_no_stitching(maze: Maze, agent: Agent) -> None:
-    block = play_of("any", TASKS[0])
+    block = block_of("any", TASKS[0])
     none, limited = (
         play_from_start(maze.vector_env(), agent, stitcher, maze, SAMPLED, block, STEP_LIMIT)
         for stitcher in (NoStitch(), random_stitch(maze.actions, limit=0))
@@ -408,7 +408,7 @@ def test_a_limit_of_0_is_no_stitching(maze: Maze, agent: Agent) -> None:
 def test_watching_changes_nothing(
     maze: Maze, agent: Agent, stitchers: dict[str, Stitcher], method: str
 ) -> None:
-    block = play_of(method, TASKS[2])
+    block = block_of(method, TASKS[2])
     watched, unwatched = (
         play_from_start(
             maze.vector_env(), agent, stitchers[method], maze, SAMPLED, block, STEP_LIMIT, recorder
@@ -423,7 +423,7 @@ def test_segments_have_the_declared_types(
 ) -> None:
     played = play_from_start(
         maze.vector_env(), agent, stitchers["mb-stitch"], maze, SAMPLED,
-        play_of("mb-stitch", TASKS[0]), STEP_LIMIT,
+        block_of("mb-stitch", TASKS[0]), STEP_LIMIT,
     )  # fmt: skip
     alive = 6
     for segments in played:
@@ -445,10 +445,10 @@ def test_nobody_plays(maze: Maze, agent: Agent, stitchers: dict[str, Stitcher]) 
     for method in METHODS:
         (segments,) = play_from_start(
             maze.vector_env(), agent, stitchers[method], maze, SAMPLED,
-            play_of(method, TASKS[0], ()), STEP_LIMIT,
+            block_of(method, TASKS[0], ()), STEP_LIMIT,
         )  # fmt: skip
         assert len(segments.success) == 0
-        block = play_of(method, ("a", "b"), ())
+        block = block_of(method, ("a", "b"), ())
         nobody, log, _ = segment(
             maze, agent, stitchers[method], SAMPLED, block, [], np.zeros((0, 2))
         )
@@ -460,7 +460,7 @@ def test_the_mode_leaves_nothing_to_chance(maze: Maze, agent: Agent) -> None:
     def paths(config: RolloutConfig) -> set[tuple[tuple[int, ...], ...]]:
         log = Log()
         play_from_start(
-            maze.vector_env(), agent, NoStitch(), maze, config, play_of("no-stitch", ("c",)),
+            maze.vector_env(), agent, NoStitch(), maze, config, block_of("no-stitch", ("c",)),
             STEP_LIMIT, log,
         )  # fmt: skip
         return {tuple(log.path(row)) for row in range(6)}
@@ -477,7 +477,7 @@ def keys(block: Block, purpose: str, *, by_method: bool = False) -> list[bytes]:
 
 
 def test_methods_share_environment_and_policy_but_not_planner_streams() -> None:
-    ours, theirs = play_of("mb-stitch", ("a", "b")), play_of("no-stitch", ("a", "b"))
+    ours, theirs = block_of("mb-stitch", ("a", "b")), block_of("no-stitch", ("a", "b"))
     for purpose in ("environment", "policy"):
         assert keys(ours, purpose) == keys(theirs, purpose)
     assert not set(keys(ours, "planner", by_method=True)) & set(
@@ -486,7 +486,7 @@ def test_methods_share_environment_and_policy_but_not_planner_streams() -> None:
 
 
 def test_every_episode_of_every_node_has_its_own_streams() -> None:
-    block = play_of("m", ("a", "b"))
+    block = block_of("m", ("a", "b"))
     others = [
         replace(block, root_seed=1),
         replace(block, benchmark="kitchen"),
@@ -504,8 +504,8 @@ def test_every_episode_of_every_node_has_its_own_streams() -> None:
 
 
 def test_a_stream_goes_with_its_episode_not_with_its_row() -> None:
-    forwards = play_of("m", ("a",), [3, 5, 9])
-    backwards = play_of("m", ("a",), [9, 5, 3])
+    forwards = block_of("m", ("a",), [3, 5, 9])
+    backwards = block_of("m", ("a",), [9, 5, 3])
     assert keys(forwards, "policy") == keys(backwards, "policy")[::-1]
 
 
@@ -533,7 +533,7 @@ def test_stitchers_draw_from_the_planner_streams_of_their_method(maze: Maze, age
     cells = np.array([[3.0, 1.0]] * 6)
     for method in ("one", "other"):
         drawn: list[bytes] = []
-        block = play_of(method, ("a", "d"))
+        block = block_of(method, ("a", "d"))
         segment(maze, agent, PlannerRecorder(drawn), SAMPLED, block, [5] * 6, cells)
         assert drawn == keys(block, "planner", by_method=True)
 
@@ -617,7 +617,7 @@ def on_the_floor(
     skill: str = "corner",
     config: RolloutConfig = MODE,
 ) -> tuple[Segments, Log]:
-    block = play_of("signposts", ("home", skill), range(len(cells)))
+    block = block_of("signposts", ("home", skill), range(len(cells)))
     outcome, log, _ = segment(
         FLOOR, agent, stitcher, config, block, [budget] * len(cells), np.array(cells, dtype=float)
     )
@@ -834,7 +834,7 @@ def test_the_stop_rule_watches_the_ensemble_value(alpha: float, steps: int) -> N
 def displacements(stitcher: Stitcher, method: str) -> list[list[tuple[int, int]]]:
     """The executed moves of each episode, by a policy of pure chance far from any wall."""
     cells = [(6, col) for col in (5, 6, 7)] * 2
-    block = play_of(method, ("home", "corner"))
+    block = block_of(method, ("home", "corner"))
     env, log = MazeVectorEnv(FLOOR), Log()
     begin(env, block, np.array(cells, dtype=float))
     agent = walker(v_row=[-1.0], move=None)
@@ -874,7 +874,7 @@ def test_snapshots_are_taken_where_each_episode_stopped() -> None:
 
 def test_a_task_ends_when_nobody_is_left() -> None:
     """From home the policy only goes right: north is never reached, nor anything after it."""
-    block = play_of("no-stitch", ("north", "corner"))
+    block = block_of("no-stitch", ("north", "corner"))
     played = play_from_start(FLOOR.vector_env(), walker(), NoStitch(), FLOOR, MODE, block, 20)
     assert len(played) == 1
     assert not played[0].success.any()

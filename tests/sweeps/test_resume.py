@@ -12,11 +12,11 @@ from typing import Any
 
 import optuna
 import pytest
+from optuna.storages.journal import JournalFileBackend
 
 from orchestrator.errors import ChangedError, LockedError, StorageError
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.work import evaluation
-from sweeps import study as studies
 from sweeps.spec import Pruner
 from sweeps.study import JOURNAL, SweepStudy, repair
 from tests.orchestrator.tiny import Lines
@@ -67,8 +67,7 @@ def test_killed_at_every_fourth_write_to_the_journal(
         shutil.copytree(trained, undisturbed)
         sweep_in(undisturbed, sweep)
         expected = promised(undisturbed, sweep)
-    backend = studies.JournalFileBackend
-    append, written = backend.append_logs, [0]
+    append, written = JournalFileBackend.append_logs, [0]
 
     def append_and_die(self: Any, logs: Any) -> None:
         append(self, logs)
@@ -76,7 +75,7 @@ def test_killed_at_every_fourth_write_to_the_journal(
         if written[0] % (20 if pruned else 4) == 0:
             raise Killed
 
-    monkeypatch.setattr(backend, "append_logs", append_and_die)
+    monkeypatch.setattr(JournalFileBackend, "append_logs", append_and_die)
     deaths = 0
     while True:
         try:

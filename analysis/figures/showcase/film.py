@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 from analysis.figures.showcase.frames import render_frames
 from analysis.figures.showcase.maze import draw_path_so_far
 from analysis.figures.showcase.physics import STITCH, segment_labels, segment_numbers
-from analysis.figures.showcase.scenes import NoPictureError, scene_of
+from analysis.figures.showcase.scenes import NoPictureError, drawing_of, scene_of
 from analysis.figures.style import INK, house_style
 from analysis.files import replaced_file
-from analysis.schema import RunSpec
+from analysis.schema import RunSpec, kind_of
 
 DPI = 100
 WIDTH, CAPTION = 4.0, 0.5  # inches
@@ -32,23 +32,33 @@ def write_film(showcase: Mapping[str, Any], spec: RunSpec, path: Path) -> None:
         raise NoPictureError(
             "imageio-ffmpeg, which writes films, is not installed: pip install imageio-ffmpeg"
         ) from None
-    kind, episode = showcase["kind"], showcase["episodes"][-1]
+    draw, episode = drawing_of(FRAMES, showcase), showcase["episodes"][-1]
     with house_style():
-        frames = list(FRAMES[kind](showcase, episode, spec))
+        frames = list(draw(showcase, episode, spec))
+    if not frames:
+        raise NoPictureError("the episode has no step: its skill is accomplished as it begins")
     frames += [frames[-1]] * LAST
     height, width, _ = frames[0].shape
     with replaced_file(path) as draft:
         writer = imageio_ffmpeg.write_frames(
             str(draft),
             (width, height),
-            fps=STEPS_A_SECOND[kind],
+            fps=STEPS_A_SECOND[kind_of(showcase)],
             macro_block_size=2,
             output_params=["-f", "mp4"],  # whatever the draft's name ends with
         )
-        writer.send(None)
-        for frame in frames:
-            writer.send(np.ascontiguousarray(frame))
-        writer.close()
+        try:
+            writer.send(None)
+            for frame in frames:
+                writer.send(np.ascontiguousarray(frame))
+            writer.close()
+            written, _ = imageio_ffmpeg.count_frames_and_secs(str(draft))
+        except (OSError, RuntimeError) as error:
+            raise NoPictureError(f"the film could not be written: {error}") from error
+        if written != len(frames):  # ffmpeg's exit status is not told
+            raise NoPictureError(
+                f"the film could not be written: {written} of {len(frames)} frames; is there room?"
+            )
 
 
 def _physics(

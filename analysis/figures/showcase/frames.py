@@ -14,7 +14,8 @@ import numpy as np
 from analysis.figures.showcase.scenes import NoPictureError
 
 BACKENDS = ("egl", "osmesa")  # of MuJoCo, those that need no display
-MOST_SECONDS = 300  # of drawing; a driver that hangs must not hang the report
+MOST_SECONDS = 300  # to start and draw a sheet; a driver that hangs must not hang the report
+SECONDS_A_FRAME = 2.0  # more, for each
 
 
 def render_frames(scene: Mapping[str, Any], positions: np.ndarray) -> np.ndarray:
@@ -26,7 +27,8 @@ def render_frames(scene: Mapping[str, Any], positions: np.ndarray) -> np.ndarray
         np.save(recorded, positions)
         complaints = []
         for backend in BACKENDS:
-            complaint = _render(backend, described, recorded, drawn)
+            seconds = MOST_SECONDS + SECONDS_A_FRAME * len(positions)
+            complaint = _render(backend, seconds, described, recorded, drawn)
             if not complaint:
                 return np.asarray(np.load(drawn))
             if "No module named 'mujoco'" in complaint:
@@ -37,7 +39,7 @@ def render_frames(scene: Mapping[str, Any], positions: np.ndarray) -> np.ndarray
     )
 
 
-def _render(backend: str, *files: Path) -> str:
+def _render(backend: str, seconds: float, *files: Path) -> str:
     """Draws with one of MuJoCo's backends; returns why not, if not."""
     try:
         run = subprocess.run(
@@ -46,10 +48,10 @@ def _render(backend: str, *files: Path) -> str:
             cwd=Path(__file__).parents[3],
             capture_output=True,
             text=True,
-            timeout=MOST_SECONDS,
+            timeout=seconds,
         )
     except subprocess.TimeoutExpired:
-        return f"took more than {MOST_SECONDS} s"
+        return f"took more than {seconds:.0f} s"
     if run.returncode == 0:
         return ""
     said = run.stderr.strip().splitlines()

@@ -4,7 +4,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+from analysis.schema import kind_of
 
 
 class NoPictureError(Exception):
@@ -53,11 +55,24 @@ VIEWS = {
 }
 
 
+NO_DRAWING = "recordings of the kind {!r} cannot be drawn here"
+
+T = TypeVar("T")
+
+
+def drawing_of(drawings: Mapping[str, T], showcase: Mapping[str, Any]) -> T:
+    """What draws a recording. NoPictureError where nothing here does."""
+    kind = kind_of(showcase)
+    if kind not in drawings:
+        raise NoPictureError(NO_DRAWING.format(kind))
+    return drawings[kind]
+
+
 def scene_of(showcase: Mapping[str, Any], episode: Mapping[str, Any]) -> dict[str, Any]:
     """What `analysis.render` is told of an episode, as JSON."""
     view = VIEWS.get(showcase["benchmark"])
     if view is None:
-        raise NoPictureError(f"nobody has said how to look at {showcase['benchmark']}")
+        raise NoPictureError(f"analysis.figures has no view of {showcase['benchmark']}")
     if not view.file and "model" not in showcase:
         raise NoPictureError("the run is older than pictures of it; run it again")
     return {

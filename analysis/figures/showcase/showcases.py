@@ -11,10 +11,16 @@ from analysis.figures.drawn import DRAWING, PHOTOGRAPH, Drawn
 from analysis.figures.showcase.frames import render_frames
 from analysis.figures.showcase.maze import draw_showcase
 from analysis.figures.showcase.physics import draw_sheet, draw_values, segment_labels, sheet_steps
-from analysis.figures.showcase.scenes import VIEWS, NoPictureError, scene_of
+from analysis.figures.showcase.scenes import (
+    NO_DRAWING,
+    VIEWS,
+    NoPictureError,
+    drawing_of,
+    scene_of,
+)
 from analysis.figures.style import house_style, save
 from analysis.run import Run
-from analysis.schema import RunSpec
+from analysis.schema import RunSpec, kind_of
 
 SHOWCASE_CAPTION = (
     "As Figure 1 of the paper: demonstrated skills (left), then whole episodes, the skill in "
@@ -57,7 +63,11 @@ def draw_showcases(run: Run, folder: Path) -> list[Drawn]:
     """Of every part, or of the run itself."""
     drawn = []
     for part, showcase in run.showcases.items():
-        drawn += SHOWCASES[showcase["kind"]](_Shown(part, showcase, run.spec), folder)
+        shown, kind = _Shown(part, showcase, run.spec), kind_of(showcase)
+        if kind in SHOWCASES:
+            drawn += SHOWCASES[kind](shown, folder)
+        else:
+            drawn.append(shown.drawn("showcase", "", f"no picture: {NO_DRAWING.format(kind)}"))
     return drawn
 
 
@@ -101,7 +111,7 @@ def _path(showcase: dict[str, Any], spec: RunSpec) -> Figure:
 def write_picture(showcase: dict[str, Any], spec: RunSpec, path: Path) -> None:
     """The last episode in one PNG: a contact sheet, or its path. NoPictureError as frames do."""
     with house_style():
-        save(PICTURES[showcase["kind"]](showcase, spec), path.parent, path.stem, ("png",))
+        save(drawing_of(PICTURES, showcase)(showcase, spec), path.parent, path.stem, ("png",))
 
 
 def _which_episode(shown: _Shown) -> str:

@@ -64,7 +64,7 @@ def _recordings(source: str) -> list[Recording]:
     except ModuleNotFoundError as error:
         raise DataError(
             f"{error.name} is not installed, which reads Minari datasets: "
-            "pip install 'skillstitch[human]'"
+            "install skillstitch with its extra `human`, as in `pip install -e '.[human]'`"
         ) from error
     except (ValueError, KeyError, OSError, TypeError) as error:
         raise DataError(f"{place}: cannot be read as a Minari dataset: {error}") from error

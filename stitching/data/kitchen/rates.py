@@ -39,10 +39,10 @@ def success_rates(config: RatesConfig) -> Attempts:
     States met are "start", the start pose, and the names of the skills just done in the human
     orders. There the attempts that another skill's miss prevented are not counted.
     """
-    hand = KitchenDataConfig(
+    data = KitchenDataConfig(
         quality=config.quality, skill_steps=config.steps, return_home=config.return_home
     )
-    alone = replace(hand, episodes=config.attempts)
+    alone = replace(data, episodes=config.attempts)
     attempts: Attempts = {}
 
     def record(before: str, segment: Segment) -> None:
@@ -54,7 +54,7 @@ def success_rates(config: RatesConfig) -> Attempts:
             for segment in segments[:1]:
                 record("start", segment)
     for order in human_orders() if config.episodes else ():
-        together = replace(hand, episodes=config.episodes)
+        together = replace(data, episodes=config.episodes)
         for segments in play(together, order, config.seed):
             for before, segment in pairwise(segments):
                 record(SKILLS[before.skill], segment)

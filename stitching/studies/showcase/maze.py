@@ -10,6 +10,7 @@ import numpy as np
 from stitching.data.transitions import Transitions
 from stitching.envs.maze import Maze
 from stitching.envs.protocol import VectorEnv
+from stitching.studies.showcase.recorder import simulated
 from stitching.studies.showcase.shown import Shown
 
 DEMONSTRATIONS = 10  # paths shown of each skill
@@ -25,7 +26,7 @@ class PathRecorder:
     def step(
         self, env: VectorEnv, rows: np.ndarray, episodes: np.ndarray, skill: int, phase: str
     ) -> None:
-        for number, snapshot in zip(episodes.tolist(), env.snapshot(rows), strict=True):
+        for number, snapshot in zip(episodes.tolist(), simulated(env).snapshot(rows), strict=True):
             episode = self.episode(number)
             episode["positions"].append([int(x) for x in snapshot])
             episode["phases"].append(phase)

@@ -13,6 +13,7 @@ from stitching.envs.protocol import Benchmark, VectorEnv
 from stitching.models.agent import Agent
 from stitching.planning.objective import spread_over_members
 from stitching.rollout import Segments
+from stitching.studies.showcase.recorder import simulated
 from stitching.studies.showcase.scenery import SCENERIES, Scenery
 from stitching.studies.showcase.shown import Shown
 
@@ -56,6 +57,7 @@ class StepRecorder:
     def step(
         self, env: VectorEnv, rows: np.ndarray, episodes: np.ndarray, skill: int, phase: str
     ) -> None:
+        env = simulated(env)
         values = self.agent.values(torch.from_numpy(env.observe(rows)), skill)
         spread = spread_over_members(values)
         positions = cast(PhysicsVectorEnv, env).positions(rows)

@@ -1,10 +1,9 @@
-import pandas as pd
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from analysis.episodes import episodes_from_segments
@@ -35,7 +34,9 @@ def test_draws_what_there_is_data_for(run: Run, tmp_path: Path) -> None:
         assert "<dc:date>" not in (tmp_path / f"{figure.name}.svg").read_text()
 
 
-def test_pair_rates_are_of_the_second_skill_given_the_first(segments: pd.DataFrame, spec: RunSpec) -> None:
+def test_pair_rates_are_of_the_second_skill_given_the_first(
+    segments: pd.DataFrame, spec: RunSpec
+) -> None:
     rates = pair_rates(segments, spec, "mb-stitch")
     assert rates.shape == (4, 4)
     assert np.isnan(np.diag(rates)).all()
@@ -43,5 +44,7 @@ def test_pair_rates_are_of_the_second_skill_given_the_first(segments: pd.DataFra
     assert rates[0, 2] == pytest.approx(seconds["success"].mean())
 
 
-def test_pair_rates_of_a_method_not_played_are_unknown(segments: pd.DataFrame, spec: RunSpec) -> None:
+def test_pair_rates_of_a_method_not_played_are_unknown(
+    segments: pd.DataFrame, spec: RunSpec
+) -> None:
     assert np.isnan(pair_rates(segments, spec, "unheard-of")).all()

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -12,7 +11,9 @@ from analysis.studies.pairs import both_skills, pair_groups, second_skills
 from tests.analysis.kitchen_run import METHODS, ORDERS, kitchen_spec, write_kitchen
 
 
-def section(write_run: Callable[..., Path], folder: Path, methods: list[str], *, own_first_skill: bool) -> str:
+def section(
+    write_run: Callable[..., Path], folder: Path, methods: list[str], *, own_first_skill: bool
+) -> str:
     named = [
         {"name": name, "label": METHODS[name], "own_first_skill": own_first_skill}
         for name in methods

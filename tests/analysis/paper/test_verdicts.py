@@ -1,5 +1,4 @@
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -69,7 +68,9 @@ def test_a_lead_is_judged_by_its_interval(
     assert claims(replace(table, leads=leads))[0].verdict == verdict
 
 
-def test_a_verdict_from_one_seed_is_of_its_models_alone(segments: pd.DataFrame, spec: RunSpec) -> None:
+def test_a_verdict_from_one_seed_is_of_its_models_alone(
+    segments: pd.DataFrame, spec: RunSpec
+) -> None:
     alone = replace(spec, seeds=(0,))
     one = build_table(episodes_from_segments(segments, alone), alone, alone.tables[0])
     found = claims(one)

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -23,7 +22,9 @@ def table(forecasts: list[float], successes: list[int], trials: int = 10) -> pd.
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def test_counts_are_no_stitchs_over_all_seeds(tmp_path: Path, write_run: Callable[..., Path]) -> None:
+def test_counts_are_no_stitchs_over_all_seeds(
+    tmp_path: Path, write_run: Callable[..., Path]
+) -> None:
     found = forecast_table(load_run(write_kitchen(write_run, tmp_path / "run")))
     rows = found.set_index(["first", "second"])
     assert row(rows, "microwave", "kettle")[["successes", "trials"]].tolist() == [4, 8]
@@ -48,7 +49,9 @@ def test_nothing_is_said_of_too_little() -> None:
     assert agreement(table([0.1, 0.2, 0.3], [0, 0, 0], trials=0)) is None
 
 
-def test_the_report_has_a_section_a_figure_and_a_table(tmp_path: Path, write_run: Callable[..., Path]) -> None:
+def test_the_report_has_a_section_a_figure_and_a_table(
+    tmp_path: Path, write_run: Callable[..., Path]
+) -> None:
     page = build_report(write_kitchen(write_run, tmp_path / "run"))
     assert "A forecast of pairs" in page.read_text()
     assert len(pd.read_csv(page.parent / "forecast.csv")) == 12

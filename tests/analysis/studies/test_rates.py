@@ -60,7 +60,9 @@ def test_rates_of_every_skill_of_a_run(tmp_path: Path, write_run: Callable[..., 
     assert kettle["beta_scaled"] == pytest.approx(5.0 * 0.04 / 0.08)
 
 
-def test_a_level_has_its_own_rates_and_no_stitched_ones(tmp_path: Path, write_run: Callable[..., Path]) -> None:
+def test_a_level_has_its_own_rates_and_no_stitched_ones(
+    tmp_path: Path, write_run: Callable[..., Path]
+) -> None:
     rates = rate_table(load_run(merged_run(write_run, tmp_path / "run")))
     rates = rates.set_index(["part", "skill"])
     trials = rates["after_trials"]

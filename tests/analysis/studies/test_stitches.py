@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -84,7 +83,9 @@ def test_the_page_has_a_line_for_each_part_and_outcome(run: Run) -> None:
     assert "-9.00 → -11.00" in html
 
 
-def test_first_skills_and_hand_overs_are_told_apart(tmp_path: Path, write_run: Callable[..., Path]) -> None:
+def test_first_skills_and_hand_overs_are_told_apart(
+    tmp_path: Path, write_run: Callable[..., Path]
+) -> None:
     study = kitchen_first_skills()
     run = load_run(write_kitchen(write_run, tmp_path / "run", stitches=study))
     table = outcome_table(run).set_index("kind")

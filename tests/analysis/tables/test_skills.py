@@ -1,6 +1,4 @@
 import pandas as pd
-from typing import Any
-
 import pytest
 
 from analysis.episodes import episodes_from_segments

@@ -1,6 +1,5 @@
 import io
 from dataclasses import replace
-from typing import Any
 
 import pandas as pd
 import pytest

@@ -47,7 +47,7 @@ def spec() -> Spec:
         episodes=4,
         block_episodes=4,
         rollout=replace(spec.rollout, temperature=0.0, first_stitch=False),
-        data=KitchenDataConfig(episodes=12, held_out=1, quality=0.9),  # steady hands
+        data=KitchenDataConfig(episodes=12, held_out=1, quality=0.9),  # steady demonstrators
         agent=skills,
         dynamics=DynamicsConfig(updates=300, width=32, members=2, activation="elu"),
     )

@@ -68,6 +68,6 @@ def test_others_say_what_to_install(done: Place) -> None:
     for words in (("plan", TINY), ("run", TINY, "--out", done.root / "new"), ("enjoy", done.out)):
         answer = command(*words)
         assert answer.returncode == 2, answer.stderr
-        assert "pip install 'skillstitch[run]'" in answer.stderr
+        assert "pip install -e '.[run]'" in answer.stderr
         assert "Traceback" not in answer.stderr
     assert not (done.root / "new").exists()

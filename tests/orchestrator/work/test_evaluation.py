@@ -49,6 +49,7 @@ Break = Callable[..., None]
 @pytest.fixture
 def break_blocks(monkeypatch: pytest.MonkeyPatch) -> Iterator[Break]:
     """Make blocks raise while they are played: those a condition holds for, so many times."""
+
     def break_blocks(broken: Callable[[Block], bool], times: int = 10**9) -> None:
         left = Counter[Block]()
 
@@ -58,14 +59,14 @@ def break_blocks(monkeypatch: pytest.MonkeyPatch) -> Iterator[Break]:
             stitcher: Stitcher,
             benchmark: Benchmark,
             config: RolloutConfig,
-            play: Block,
+            block: Block,
             budget: np.ndarray,
             recorder: Recorder | None,
         ) -> Segments:
-            left[play] += 1
-            if broken(play) and left[play] <= times:
+            left[block] += 1
+            if broken(block) and left[block] <= times:
                 raise RuntimeError("the simulator fell over")
-            return play_segment(env, agent, stitcher, benchmark, config, play, budget, recorder)
+            return play_segment(env, agent, stitcher, benchmark, config, block, budget, recorder)
 
         monkeypatch.setattr(playing, "play_segment", faulty)
 
@@ -77,7 +78,7 @@ def break_blocks(monkeypatch: pytest.MonkeyPatch) -> Iterator[Break]:
 def test_a_passing_fault_is_overcome(
     spec: Spec, trained: Place, expected: dict[str, bytes], break_blocks: Break, times: int
 ) -> None:
-    break_blocks(lambda play: play.prefix[-1] == "g1", times)
+    break_blocks(lambda block: block.prefix[-1] == "g1", times)
     trained.carry_out(spec)
     assert promised_bytes(trained.out) == expected
     assert trained.directory.read_json("quarantine.json") == []
@@ -98,7 +99,7 @@ def test_a_block_that_keeps_failing_is_given_up_and_the_rest_finishes(
     break_blocks: Break,
 ) -> None:
     """Episodes 4 and 5 of seed 1's first skill g0: with them go all their later skills."""
-    break_blocks(lambda play: (play.seed, play.prefix, play.episodes) == (1, ("g0",), (4, 5)))
+    break_blocks(lambda block: (block.seed, block.prefix, block.episodes) == (1, ("g0",), (4, 5)))
     lines = Lines()
     with pytest.raises(
         IncompleteError, match=r"1 blocks were given up .*quarantine\.json"
@@ -131,7 +132,7 @@ def test_a_block_that_keeps_failing_is_given_up_and_the_rest_finishes(
     assert "partial" in (trained.out / "report" / "table1.md").read_text().lower()
 
     counted.played.clear()
-    break_blocks(lambda play: False)
+    break_blocks(lambda block: False)
     trained.carry_out(spec)
     assert key in counted.played
     assert set(counted.played) <= below
@@ -142,7 +143,7 @@ def test_a_block_that_keeps_failing_is_given_up_and_the_rest_finishes(
 def test_blocks_given_up_are_tried_again_by_every_command(
     spec: Spec, trained: Place, counted: Counted, break_blocks: Break
 ) -> None:
-    break_blocks(lambda play: (play.seed, play.prefix, play.episodes) == (1, ("g0",), (4, 5)))
+    break_blocks(lambda block: (block.seed, block.prefix, block.episodes) == (1, ("g0",), (4, 5)))
     for _ in range(2):
         with pytest.raises(IncompleteError):
             trained.carry_out(spec)
@@ -153,7 +154,7 @@ def test_blocks_given_up_are_tried_again_by_every_command(
 def test_a_run_in_which_no_block_can_be_played_says_so(
     spec: Spec, plan: Plan, trained: Place, break_blocks: Break
 ) -> None:
-    break_blocks(lambda play: True)
+    break_blocks(lambda block: True)
     with pytest.raises(IncompleteError, match=rf"{len(list(plan.roots())) * 2} blocks"):
         trained.carry_out(spec)
 

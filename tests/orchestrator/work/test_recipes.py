@@ -16,6 +16,7 @@ def clear() -> None:
     importlib.invalidate_caches()
     code_fingerprint.cache_clear()
     recipes._code.cache_clear()
+    recipes._file_of.cache_clear()
 
 
 Write = Callable[[str, str], None]

@@ -14,7 +14,11 @@ from hypothesis.extra.numpy import arrays
 from stitching.planning.objective import NORMS, Norm, conservative_value
 
 POPULATION, OBSERVATION = 4, 3
-REDUCE: dict[Norm, Callable[[list[np.floating[Any]]], np.floating[Any]]] = {"mean": np.mean, "l2": np.linalg.norm, "max": np.max}
+REDUCE: dict[Norm, Callable[[list[np.floating[Any]]], np.floating[Any]]] = {
+    "mean": np.mean,
+    "l2": np.linalg.norm,
+    "max": np.max,
+}
 
 members = st.integers(1, 6)
 numbers = st.floats(-10, 10, width=32)

@@ -131,7 +131,7 @@ def test_a_recording_without_its_model_says_so() -> None:
 
 
 def test_a_benchmark_that_nobody_looked_at_says_so() -> None:
-    with pytest.raises(NoPictureError, match="how to look at juggling"):
+    with pytest.raises(NoPictureError, match="no view of juggling"):
         scene_of({"benchmark": "juggling"}, {})
 
 
