@@ -21,7 +21,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load as load_safetensors
 from safetensors.numpy import save as save_safetensors
 
-from orchestrator.errors import IncompleteError, StorageError
+from orchestrator.errors import IncompleteError, StorageError, UsageError
 
 USUAL_STORE = Path("runs/store")
 Arrays = dict[str, np.ndarray]
@@ -103,6 +103,15 @@ class Store:
             return self.read(kind, key).digest == artifact.digest
         except CorruptArtifactError:
             return False
+
+    def demand(self, kind: str, key: str) -> Artifact:
+        """As `read`, for who will not make what is missing: UsageError says what to do."""
+        if (kind, key) not in self:
+            raise UsageError(
+                f"{self.root} has no {kind} {key}: name the store with --store, or run the same "
+                "command again, which makes it"
+            )
+        return self.read(kind, key)
 
     def read(self, kind: str, key: str) -> Artifact:
         """The artifact, every file's digest checked before any of it is used.

@@ -148,12 +148,7 @@ class Replay:
         digests, found = ledger.artifacts(), {}
         for key in {key for task in tasks for key in task.artifacts.values()}:
             kind = self.plan.recipes[key].kind
-            if (kind, key) not in self.store:
-                raise UsageError(
-                    f"{self.store.root} has no {kind} {key}: name the store with --store, or run "
-                    "the same command again, which makes it"
-                )
-            found[key] = self.store.read(kind, key)
+            found[key] = self.store.demand(kind, key)
             if digests.get(key, found[key].digest) != found[key].digest:
                 raise ChangedError(
                     f"{kind} {key} in {self.store.root} has other bytes than the one that "

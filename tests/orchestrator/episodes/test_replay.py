@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import torch
 
+from orchestrator.episodes.film import film
+from orchestrator.episodes.replay import Asked, replay
 from orchestrator.errors import ChangedError, NondeterminismError, UsageError
-from orchestrator.film import film
-from orchestrator.replay import Asked, replay
 from orchestrator.spec.spec import Spec
 from orchestrator.storage.store import Artifact
 from orchestrator.work.plan import Plan

@@ -10,8 +10,8 @@ from analysis.figures.showcase.scenes import NoPictureError
 from analysis.figures.showcase.showcases import write_picture
 from analysis.run import load_run_spec
 from analysis.schema import SEPARATOR
+from orchestrator.episodes.replay import Asked, replay
 from orchestrator.errors import UsageError
-from orchestrator.replay import Asked, replay
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.storage.store import storage_errors
 

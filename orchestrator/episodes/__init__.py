@@ -1,0 +1,1 @@
+"""Episodes of a run, played again: step by step, and as films."""
