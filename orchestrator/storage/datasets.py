@@ -27,8 +27,14 @@ def demonstrated(plan: Plan, dataset: Artifact) -> dict[str, int]:
 
 
 def undemonstrated_skills(plan: Plan, store: Store) -> list[str]:
-    """Skills of the plan's tasks that none of its datasets accomplishes, all of which are there."""
-    datasets = [store.read(plan.recipes[key].kind, key) for key in plan.datasets.values()]
+    """Skills of the plan's tasks that none of the data accomplishes that its models are learned from.
+
+    None while some of these are not in the store.
+    """
+    needed = [(plan.recipes[key].kind, key) for key in plan.datasets.values() if key in plan.needed]
+    if not all(each in store for each in needed):
+        return []
+    datasets = [store.read(*each) for each in needed]
     shown = {skill for dataset in datasets for skill in demonstrated(plan, dataset)}
     asked = {skill for task in plan.spec.all_tasks for skill in task}
     return [skill for skill in plan.spec.skill_names if skill in asked - shown]
