@@ -27,7 +27,7 @@ def demonstrated(plan: Plan, dataset: Artifact) -> dict[str, int]:
 
 
 def undemonstrated_skills(plan: Plan, store: Store) -> list[str]:
-    """Skills of the plan's tasks that none of the data accomplishes that its models are learned from.
+    """Skills of the plan's tasks that no data accomplishes of what its models are learned from.
 
     None while some of these are not in the store.
     """
