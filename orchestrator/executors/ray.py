@@ -7,6 +7,7 @@ import os
 import socket
 from collections import deque
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from orchestrator.cores import usable_cores
@@ -19,12 +20,18 @@ from orchestrator.work.jobs import BuildJob, Job, PlayJob, Report
 os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
 os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
 
+TOKEN = Path.home() / ".ray" / "auth_token"
+if TOKEN.is_file() or {"RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"} & os.environ.keys():
+    # `ray start` asks for a token where there is one; who connects sends it only when told to.
+    os.environ.setdefault("RAY_AUTH_MODE", "token")
+
 OBJECT_STORE_BYTES = 512 * 2**20
 JOBS_PER_WORKER = 2  # one running, one waiting, so that no worker idles between jobs
 SECONDS_TO_ANSWER = 5.0  # of a cluster's head node
 SECONDS_BETWEEN_CHECKS = 5.0  # for nodes that have gone, where no job finishes
 
 import ray  # noqa: E402
+from ray._private.utils import read_ray_address  # noqa: E402
 from ray.exceptions import RayError  # noqa: E402
 
 
@@ -188,12 +195,20 @@ def _start(workers: int | None, address: str | None) -> None:
     # A worker is one thread; more would change the bytes.
     environment = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
     if address is not None:
+        address = _started_here() if address == "auto" else address
         try:
             _can_connect(address)
+        except OSError as error:
+            raise UsageError(f"no Ray cluster at {address}: {_first_line(error)}") from error
+        try:
             with own_handler_kept():
                 ray.init(address=address, runtime_env={"env_vars": environment}, **common)
         except (OSError, ValueError, RuntimeError) as error:
-            raise UsageError(f"no Ray cluster at {address}: {_first_line(error)}") from error
+            raise UsageError(
+                f"something answers at {address}, but no Ray cluster lets this process in "
+                f"({_first_line(error)}): where it asks for a token, copy the head's {TOKEN} here "
+                f"or set RAY_AUTH_TOKEN; its Ray must be this one's version, {ray.__version__}"
+            ) from error
         return
     os.environ.update(environment)
     with own_handler_kept():
@@ -204,6 +219,17 @@ def _start(workers: int | None, address: str | None) -> None:
             object_store_memory=OBJECT_STORE_BYTES,
             **common,
         )
+
+
+def _started_here() -> str:
+    """Where `ray start` put the head of this machine's cluster, which may be gone."""
+    found = os.environ.get("RAY_ADDRESS") or read_ray_address()
+    if not found:
+        raise UsageError(
+            "--address auto: no Ray was started on this machine (`ray start --head`), and "
+            "RAY_ADDRESS is not set; name the head, as in --address HEAD:6379"
+        )
+    return found
 
 
 def _can_connect(address: str) -> None:

@@ -2,11 +2,15 @@
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 
@@ -63,23 +67,92 @@ def test_nothing_listens_beyond_loopback() -> None:
     assert {address for _, address in listeners} <= LOOPBACK
 
 
-def test_no_cluster_at_that_address() -> None:
+def fresh() -> dict[str, str]:
+    """The environment without what importing the executor has set here."""
+    return {name: text for name, text in os.environ.items() if name != "RAY_AUTH_MODE"}
+
+
+def refused(address: str, **environment: str) -> str:
+    """What a user is told who cannot join a cluster."""
     script = (
         "from orchestrator.executors import open_executor\n"
         "from orchestrator.errors import UsageError\n"
-        "try:\n    open_executor('ray', None, '127.0.0.1:1')\n"
+        f"try:\n    open_executor('ray', None, {address!r}).close()\n"
         "except UsageError as error:\n    print(error)"
     )
     answer = subprocess.run(
         [sys.executable, "-c", script],
-        env=os.environ | {"RAY_gcs_rpc_server_reconnect_timeout_s": "1"},
+        env=fresh() | {"RAY_gcs_rpc_server_reconnect_timeout_s": "1"} | environment,
         capture_output=True,
         text=True,
         timeout=120,
         check=True,
     )
-    assert answer.stdout.startswith("no Ray cluster at 127.0.0.1:1: ")
+    return answer.stdout
+
+
+def test_no_cluster_at_that_address() -> None:
+    assert refused("127.0.0.1:1").startswith("no Ray cluster at 127.0.0.1:1: ")
     assert UsageError.exit_code == 2
+
+
+def test_a_cluster_of_this_machine_that_is_gone(tmp_path: Path) -> None:
+    """Ray itself tries for minutes."""
+    told = refused("auto", RAY_TMPDIR=str(tmp_path), RAY_ADDRESS="")
+    assert told.startswith("--address auto: no Ray was started on this machine")
+    (tmp_path / "ray").mkdir()
+    (tmp_path / "ray" / "ray_current_cluster").write_text("127.0.0.1:1")
+    told = refused("auto", RAY_TMPDIR=str(tmp_path), RAY_ADDRESS="")
+    assert told.startswith("no Ray cluster at 127.0.0.1:1: ")
+
+
+@pytest.fixture
+def guarded(tmp_path: Path) -> Iterator[tuple[str, Path]]:
+    """The address of a head that asks for a token, and the home with that token."""
+    home = tmp_path / "home"
+    (home / ".ray").mkdir(parents=True)
+    (home / ".ray" / "auth_token").write_text("0" * 64)
+    with closing(socket.socket()) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    command = [
+        "ray", "start", "--head", "--block", f"--port={port}", "--include-dashboard=false",
+        "--num-cpus=1", "--object-store-memory=100000000",
+    ]  # fmt: skip
+    with TemporaryDirectory(prefix="r") as short:  # Ray's sockets have long names
+        head = subprocess.Popen(
+            [Path(sys.executable).with_name(command[0]), *command[1:], f"--temp-dir={short}"],
+            env=fresh() | {"HOME": str(home)},
+            stdout=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        try:
+            _wait_for(port)
+            yield f"127.0.0.1:{port}", home
+        finally:
+            os.killpg(head.pid, signal.SIGTERM)
+            head.wait(60)
+
+
+def _wait_for(port: int) -> None:
+    for _ in range(300):
+        with closing(socket.socket()) as attempt:
+            if attempt.connect_ex(("127.0.0.1", port)) == 0:
+                time.sleep(3)  # for the rest of it
+                return
+        time.sleep(0.2)
+    raise TimeoutError(f"no Ray at port {port}")
+
+
+@pytest.mark.slow
+def test_a_token_is_sent_where_there_is_one(guarded: tuple[str, Path], tmp_path: Path) -> None:
+    """A first local run leaves one, and `ray start` asks for it from then on."""
+    address, home = guarded
+    assert refused(address, HOME=str(home)) == ""
+    (tmp_path / "stranger").mkdir()
+    told = refused(address, HOME=str(tmp_path / "stranger"))
+    assert told.startswith(f"something answers at {address}")
+    assert "copy the head's" in told
 
 
 @pytest.fixture
