@@ -4,7 +4,7 @@ Type checkers do not know these fields; here they are told by the types of what 
 """
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from stitching.bounds import Bounded
 
@@ -25,5 +25,10 @@ def section(owner: object, kind: type[Section]) -> Section:
 
 def with_sections(owner: Owner, *sections: Bounded) -> Owner:
     """`with_sections(spec, settings)` is `replace(spec, mb_stitch=settings)` of MB-Stitch's."""
+    return replace(owner, **fields_of(owner, *sections))
+
+
+def fields_of(owner: object, *sections: Bounded) -> dict[str, Any]:
+    """Sections by the names of their fields, to be replaced with others that must fit them."""
     names = {type(value): name for name, value in vars(owner).items()}
-    return replace(owner, **{names[type(one)]: one for one in sections})
+    return {names[type(one)]: one for one in sections}

@@ -23,7 +23,7 @@ from stitching.models.iql import IQLConfig
 from stitching.planning.cem import CEM
 from stitching.studies.stitches import START
 from tests.orchestrator.tiny import Alone, Place
-from tests.sections import section, with_sections
+from tests.sections import fields_of, section, with_sections
 
 ORDER: Order = ("microwave", "kettle", "bottom burner", "slide cabinet")
 METHODS = ("no-stitch", "random-stitch", "mf-stitch", "mb-stitch", "single-policy")
@@ -39,7 +39,17 @@ def spec() -> Spec:
         updates=3000, learning_rate=1e-3, dropout=0.0, members=2, width=32,
         policy_width=256, policy_layers=2, log_every=1000,
     )  # fmt: skip
-    small = replace(
+    sections = fields_of(
+        spec,
+        replace(section(spec, RandomStitchSettings), limit=3),
+        replace(section(spec, MFStitchSettings), limit=3, training=replace(skills, updates=100)),
+        SinglePolicySettings(">".join(ORDER), episodes=12, training=skills),
+        with_sections(
+            replace(section(spec, MBStitchSettings), limit=3),
+            CEM(population=16, elites=4, iterations=10),
+        ),
+    )
+    return replace(
         spec,
         methods=METHODS,
         lengths=(),
@@ -50,14 +60,7 @@ def spec() -> Spec:
         data=KitchenDataConfig(episodes=12, held_out=1, quality=0.9),  # steady demonstrators
         agent=skills,
         dynamics=DynamicsConfig(updates=300, width=32, members=2, activation="elu"),
-    )
-    planning = replace(section(spec, MBStitchSettings), limit=3)
-    return with_sections(
-        small,
-        replace(section(spec, RandomStitchSettings), limit=3),
-        replace(section(spec, MFStitchSettings), limit=3, training=replace(skills, updates=100)),
-        SinglePolicySettings(">".join(ORDER), episodes=12, training=skills),
-        with_sections(planning, CEM(population=16, elites=4, iterations=10)),
+        **sections,
     )
 
 

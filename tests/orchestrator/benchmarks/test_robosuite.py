@@ -15,7 +15,7 @@ from stitching.models.dynamics import DynamicsConfig
 from stitching.models.iql import IQLConfig
 from stitching.planning.cem import CEM
 from tests.orchestrator.tiny import Alone, Place
-from tests.sections import section, with_sections
+from tests.sections import fields_of, section, with_sections
 
 pytestmark = pytest.mark.slow
 
@@ -26,18 +26,21 @@ def small(name: str) -> Spec:
         updates=400, learning_rate=1e-3, dropout=0.0, members=2, width=32, policy_width=128,
         multi_task=False, log_every=200,
     )  # fmt: skip
-    small = replace(
+    sections = fields_of(
+        spec,
+        replace(section(spec, RandomStitchSettings), limit=2),
+        replace(section(spec, MFStitchSettings), limit=2, training=replace(skills, updates=50)),
+        with_sections(
+            replace(section(spec, MBStitchSettings), limit=2),
+            CEM(population=16, elites=4, iterations=5),
+        ),
+    )
+    return replace(
         spec,
         data=replace(spec.data, quality=1.0, episodes=6, held_out=2),
         agent=skills,
         dynamics=DynamicsConfig(updates=100, width=32, members=2, activation="sigmoid"),
-    )
-    planning = replace(section(spec, MBStitchSettings), limit=2)
-    return with_sections(
-        small,
-        replace(section(spec, RandomStitchSettings), limit=2),
-        replace(section(spec, MFStitchSettings), limit=2, training=replace(skills, updates=50)),
-        with_sections(planning, CEM(population=16, elites=4, iterations=5)),
+        **sections,
     )
 
 
