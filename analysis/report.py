@@ -7,7 +7,8 @@ from pathlib import Path
 import pandas as pd
 
 from analysis.episodes import write_episodes
-from analysis.figures import Drawn, draw_figures
+from analysis.figures import draw_figures
+from analysis.figures.drawn import Drawn
 from analysis.files import replaced_folder
 from analysis.page.page import render_page
 from analysis.page.profile import profile_markdown

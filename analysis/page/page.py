@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.figures import Drawn
+from analysis.figures.drawn import Drawn
 from analysis.page.profile import TITLE as PROFILE_TITLE
 from analysis.page.profile import profile_section
 from analysis.page.studies import (

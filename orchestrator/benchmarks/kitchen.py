@@ -11,8 +11,9 @@ from orchestrator.builders.kitchen import KITCHEN_BUILDERS
 from orchestrator.builders.long_horizon import LONG_HORIZON_BUILDERS
 from orchestrator.builders.studies import Studies
 from orchestrator.errors import UsageError
-from stitching.data.kitchen.demonstrations import KitchenDataConfig, Order, orders
+from stitching.data.kitchen.demonstrations import KitchenDataConfig, orders
 from stitching.data.kitchen.human import recordings_at
+from stitching.data.kitchen.segments import Order
 from stitching.envs.kitchen import GROUPS, KITCHEN
 from stitching.studies.showcase.physics import StepRecorder
 

@@ -7,7 +7,6 @@ import os
 import socket
 from collections import deque
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from orchestrator.cores import usable_cores
@@ -19,11 +18,6 @@ from orchestrator.work.jobs import BuildJob, Job, PlayJob, Report
 # Read by Ray when it is imported and started.
 os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
 os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
-
-TOKEN = Path.home() / ".ray" / "auth_token"
-if TOKEN.is_file() or {"RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"} & os.environ.keys():
-    # `ray start` asks for a token where there is one; who connects sends it only when told to.
-    os.environ.setdefault("RAY_AUTH_MODE", "token")
 
 OBJECT_STORE_BYTES = 512 * 2**20
 JOBS_PER_WORKER = 2  # one running, one waiting, so that no worker idles between jobs
@@ -206,8 +200,10 @@ def _start(workers: int | None, address: str | None) -> None:
         except (OSError, ValueError, RuntimeError) as error:
             raise UsageError(
                 f"something answers at {address}, but no Ray cluster lets this process in "
-                f"({_first_line(error)}): where it asks for a token, copy the head's {TOKEN} here "
-                f"or set RAY_AUTH_TOKEN; its Ray must be this one's version, {ray.__version__}"
+                f"({_first_line(error)}): where it asks for a token, as `ray start` does where a "
+                "local run has left one, set RAY_AUTH_MODE=token and copy the head's "
+                "~/.ray/auth_token here; its Ray must be this one's version, "
+                f"{ray.__version__}"
             ) from error
         return
     os.environ.update(environment)

@@ -145,14 +145,13 @@ def _wait_for(port: int) -> None:
 
 
 @pytest.mark.slow
-def test_a_token_is_sent_where_there_is_one(guarded: tuple[str, Path], tmp_path: Path) -> None:
+def test_a_cluster_that_asks_for_a_token_says_what_to_do(guarded: tuple[str, Path]) -> None:
     """A first local run leaves one, and `ray start` asks for it from then on."""
     address, home = guarded
-    assert refused(address, HOME=str(home)) == ""
-    (tmp_path / "stranger").mkdir()
-    told = refused(address, HOME=str(tmp_path / "stranger"))
+    assert refused(address, HOME=str(home), RAY_AUTH_MODE="token") == ""
+    told = refused(address, HOME=str(home))
     assert told.startswith(f"something answers at {address}")
-    assert "copy the head's" in told
+    assert "set RAY_AUTH_MODE=token and copy the head's ~/.ray/auth_token" in told
 
 
 @pytest.fixture
