@@ -1,13 +1,12 @@
 """Our scores with their intervals beside the paper's, row by row."""
 
-from itertools import cycle
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from analysis.figures.style import COLOURS, FAINT, INK, MARKERS, new_figure
+from analysis.figures.style import FAINT, INK, looks, new_figure
 from analysis.tables.table import Table
 
 WIDTH = 7.5  # inches
@@ -16,14 +15,14 @@ ROW_GAP = 1.5  # free height between rows, in units of one method's line
 
 def draw_scores(table: Table) -> Figure:
     """One line a method within each row: filled with an interval is ours, hollow the paper's."""
-    methods, rows = table.methods, table.rows
+    methods, rows, look_of = table.methods, table.rows, looks(table.methods)
     height = len(methods) + ROW_GAP
     figure = new_figure(WIDTH, 1.4 + 0.14 * height * len(rows))
     axes = figure.add_subplot()
     for cell in table.scores.to_dict("records"):
         place = methods.index(cell["method"])
         y = rows.index(cell["row"]) * height + place
-        colour, marker = COLOURS[place % len(COLOURS)], MARKERS[place % len(MARKERS)]
+        colour, marker = look_of[cell["method"]]
         look: dict[str, Any] = {"color": colour, "marker": marker, "ls": "none"}
         axes.plot([cell["ci_low"], cell["ci_high"]], [y, y], color=colour, lw=1.6)
         axes.plot(cell["score"], y, ms=5, **look)
@@ -38,7 +37,7 @@ def draw_scores(table: Table) -> Figure:
     axes.grid(axis="x", color=FAINT, lw=0.5)
     axes.set_axisbelow(True)
     axes.set_xlabel("score (accomplished skills / skills in the task)")
-    _legend(figure, [table.labels[method] for method in methods])
+    _legend(figure, table)
     return figure
 
 
@@ -48,14 +47,14 @@ def _upper_end(table: Table) -> float:
     return min(1.02, np.ceil(10 * highest + 0.2) / 10)
 
 
-def _legend(figure: Figure, labels: list[str]) -> None:
+def _legend(figure: Figure, table: Table) -> None:
     keys = [
-        Line2D([], [], color=colour, marker=marker, label=label, ms=5)
-        for colour, marker, label in zip(cycle(COLOURS), cycle(MARKERS), labels, strict=False)
+        Line2D([], [], color=colour, marker=marker, label=table.labels[method], ms=5)
+        for method, (colour, marker) in looks(table.methods).items()
     ]
-    keys.append(
-        Line2D([], [], color=INK, marker="o", mfc="none", ms=7.5, ls="none", label="paper (hollow)")
-    )
+    if table.scores["paper_score"].notna().any():
+        hollow: dict[str, Any] = {"marker": "o", "mfc": "none", "ms": 7.5, "ls": "none"}
+        keys.append(Line2D([], [], color=INK, label="paper (hollow)", **hollow))
     letters = np.mean([len(str(key.get_label())) for key in keys])
     columns = int(WIDTH / (0.5 + 0.075 * letters))  # inches of a key's line and of a letter
     figure.legend(handles=keys, loc="outside upper left", ncols=columns, columnspacing=1.2)

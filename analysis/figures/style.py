@@ -1,7 +1,9 @@
 """What all figures share: colours, fonts, and files whose bytes depend on the content alone."""
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,11 @@ from analysis.figures.drawn import DRAWING
 # Okabe and Ito's palette, told apart by colour-blind readers; black and yellow left out.
 COLOURS = ["#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#7F7F7F"]
 MARKERS = ["o", "s", "^", "D", "v", "P", "X", "<", ">", "*"]
+METHODS = (
+    "no-stitch", "random-stitch", "mf-stitch", "mb-stitch", "single-policy", "reach-stitch",
+)  # fmt: skip
+"""Each has its colour and marker in every figure, by its place here."""
+
 INK, FAINT = "#222222", "#D0D0D0"
 
 SETTINGS: dict[Any, Any] = {
@@ -37,6 +44,23 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "svg": {"dpi": 100, "metadata": {"Date": None, "Creator": None}},
     "png": {"dpi": 144, "metadata": {"Software": None}},
 }
+
+
+def looks(methods: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """Method → colour and marker: its own; others, and further settings of one, what is left."""
+    places: dict[str, int] = {}
+    for method in methods:
+        base = re.split(r"[\[@]", method)[0]
+        if base in METHODS and METHODS.index(base) not in places.values():
+            places[method] = METHODS.index(base)
+    left = (place for place in count() if place not in set(places.values()))
+    for method in methods:
+        if method not in places:
+            places[method] = next(left)
+    return {
+        method: (COLOURS[place % len(COLOURS)], MARKERS[place % len(MARKERS)])
+        for method, place in places.items()
+    }
 
 
 @contextmanager
