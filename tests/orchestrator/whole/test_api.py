@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,11 @@ EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
 def test_the_promised_names_are_there() -> None:
     assert all(callable(getattr(orchestrator, name)) for name in orchestrator.__all__)
     assert orchestrator.__version__
+
+
+def test_no_module_hides_a_promised_name() -> None:
+    """A module `orchestrator.plan`, once imported, would take the place of the function."""
+    assert not [name for name in orchestrator.__all__ if find_spec(f"orchestrator.{name}")]
 
 
 def test_a_suite_is_no_spec_and_a_spec_is_no_suite() -> None:
