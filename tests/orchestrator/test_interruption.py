@@ -67,7 +67,7 @@ def test_a_command_that_is_ended_says_so_and_exits_with_143() -> None:
     code = (
         "import os, signal\n"
         "from orchestrator import cli\n"
-        "cli.COMMANDS['wait'] = (lambda _: os.kill(os.getpid(), signal.SIGTERM), '')\n"
+        "cli.COMMANDS['wait'] = (lambda *_: os.kill(os.getpid(), signal.SIGTERM), '')\n"
         "cli.main(['wait'])"
     )
     ended = subprocess.run(

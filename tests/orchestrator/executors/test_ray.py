@@ -130,7 +130,7 @@ def guarded(tmp_path: Path) -> Iterator[tuple[str, Path]]:
             _wait_for(port)
             yield f"127.0.0.1:{port}", home
         finally:
-            os.killpg(head.pid, signal.SIGTERM)
+            os.killpg(head.pid, signal.SIGKILL)  # it would take half a minute to end by itself
             head.wait(60)
 
 
