@@ -12,6 +12,9 @@ from analysis import open_run
 from analysis.report import export_results
 from analysis.results import SCALES, Extent, check_results, extent_of, provenance_text
 from analysis.schema import RunError
+from analysis.tables.writers import to_csv
+
+RESULTS = Path(__file__).parents[2] / "results"
 
 EXTENT: Extent = {"scale": "quick", "seeds": 2, "episodes": 10}
 
@@ -89,6 +92,15 @@ def test_what_was_given_up_is_exported_too(tmp_path: Path, write_run: Any) -> No
     pd.testing.assert_frame_equal(kept_ones.episodes, ours.episodes)
 
 
+@pytest.mark.parametrize("table", ["table1", "table1-reach", "table2-levels"])
+def test_committed_results_give_their_own_numbers_again(table: str) -> None:
+    """Whoever has the repository alone can work a table out from its segments."""
+    folder = RESULTS / table
+    run = open_run(folder)
+    assert to_csv(run.scores(table)) == (folder / "scores.csv").read_text()
+    assert to_csv(run.gains(table)) == (folder / "gains.csv").read_text()
+
+
 def test_an_export_says_its_extent_and_keeps_to_it(
     tmp_path: Path, write_run: Callable[..., Path]
 ) -> None:
@@ -106,7 +118,7 @@ def test_an_export_says_its_extent_and_keeps_to_it(
 
 
 def test_all_that_is_committed_says_how_much_it_is() -> None:
-    folders = list((Path(__file__).parents[2] / "results").iterdir())
+    folders = list(RESULTS.iterdir())
     assert len(folders) >= 8
     for folder in folders:
         provenance = json.loads((folder / "provenance.json").read_text())
