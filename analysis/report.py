@@ -95,13 +95,13 @@ def _build(run_dir: Path) -> tuple[list[Table], Studies, list[Drawn]]:
     episodes = write_episodes(run_dir)
     tables = [build_table(episodes, run.spec, entry) for entry in run.spec.tables]
     studies = _studies(run)
+    left_out = undemonstrated_note(undemonstrated(run))
+    beside = (f"\n**{left_out}**\n" if left_out else "") + _markdown_rates(studies)
     with replaced_folder(run_dir / "report") as report:
         drawn = draw_figures(run, tables, report / "figures", studies.get("forecast"))
         for table in tables:
             name = table.entry.id
-            left_out = undemonstrated_note(undemonstrated(run))
-            beside = f"\n**{left_out}**\n" if left_out else ""
-            _write(report / f"{name}.md", to_markdown(table) + beside + _markdown_rates(studies))
+            _write(report / f"{name}.md", to_markdown(table) + beside)
             _write(report / f"{name}.tex", to_latex(table))
             _write(report / f"{name}.csv", to_csv(table.scores))
             _write(report / f"{name}-gains.csv", to_csv(table.gains))

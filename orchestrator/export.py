@@ -47,9 +47,6 @@ def export_run(directory: RunDirectory, out: Path, store_root: Path | None) -> I
     folder exists, and where Minari is not installed.
     """
     _check_minari()
-    if directory.is_suite:
-        parts = ", ".join(str(part.path) for part in directory.parts.values())
-        raise UsageError(f"{directory.path} holds several runs; name one of {parts}")
     if out.exists():
         raise UsageError(f"{out} exists; name a new folder")
     plan, store = make_plan(spec_of(directory)), Store(store_root or directory.store_root)

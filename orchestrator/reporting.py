@@ -29,13 +29,15 @@ def report_again(run: Path, results: Path | None, *, force: bool) -> Iterator[st
         if results is None:
             build_report(run)
         else:  # builds it, too
-            folders = export_results(run, results, force=force)
-            yield from (f"exported {folder}" for folder in folders)
+            yield from _export(run, results, force)
     yield f"wrote {run / 'report' / 'index.html'}"
 
 
 def export(run: Path, results: Path, *, force: bool) -> Iterator[str]:
     """Copy a finished run's tables, figures and report; as `report_again` does, without a merge."""
     with RunDirectory(run).locked(), said_to_users():
-        folders = export_results(run, results, force=force)
-    yield from (f"exported {folder}" for folder in folders)
+        yield from _export(run, results, force)
+
+
+def _export(run: Path, results: Path, force: bool) -> Iterator[str]:
+    yield from (f"exported {folder}" for folder in export_results(run, results, force=force))

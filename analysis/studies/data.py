@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable
+
 from analysis.run import Run
 from analysis.schema import SEPARATOR
 
@@ -15,8 +17,16 @@ def undemonstrated(run: Run) -> list[str]:
     if not counted:
         return []
     shown = {skill for counts in counted for skill in counts}
-    asked = {skill for task in run.spec.tasks for skill in task.split(SEPARATOR)}
-    return [run.spec.skill_label(skill) for skill in run.spec.skills if skill in asked - shown]
+    tasks = (task.split(SEPARATOR) for task in run.spec.tasks)
+    return [run.spec.skill_label(skill) for skill in left_out(run.spec.skills, tasks, shown)]
+
+
+def left_out(
+    skills: Iterable[str], tasks: Iterable[Iterable[str]], shown: Collection[str]
+) -> list[str]:
+    """Those of the skills, in their order, that tasks ask for and nothing shows."""
+    asked = {skill for task in tasks for skill in task}
+    return [skill for skill in skills if skill in asked and skill not in shown]
 
 
 def undemonstrated_note(skills: list[str]) -> str:

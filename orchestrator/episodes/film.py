@@ -23,8 +23,6 @@ def film(
 
     Raises what `replay` does; UsageError where nothing can be drawn here.
     """
-    if directory.is_suite:
-        raise UsageError(f"{directory.path} holds several runs; name one of {_parts(directory)}")
     if out is not None and out.suffix != ".mp4":
         raise UsageError(f"--out {out}: a film's name ends with .mp4")
     shown = replay(directory, asked, store)
@@ -47,7 +45,3 @@ def film(
         except NoPictureError as error:
             raise UsageError(str(error)) from None
     yield f"wrote {path} and {path.with_suffix('.png').name}"
-
-
-def _parts(directory: RunDirectory) -> str:
-    return ", ".join(str(part.path) for part in directory.parts.values())

@@ -100,7 +100,7 @@ class Replay:
         if number is None:
             number = self._most_accomplished(ledger)
         chunk = next(c for c, (first, end) in enumerate(self.plan.chunks) if first <= number < end)
-        tasks = [self.plan.tasks[node, chunk] for node in self.path]
+        tasks = [self.plan.task(node, chunk) for node in self.path]
         artifacts = self._artifacts(ledger, tasks)
         player, recorder = BlockPlayer(), self._recorder(tasks[-1], artifacts)
         segment: list[int] = []  # which of the task's skills each step belongs to
@@ -128,7 +128,7 @@ class Replay:
         accomplished: dict[int, int] = {}
         for node in self.path:
             for chunk, _ in enumerate(self.plan.chunks):
-                for _, outcome in ledger.outcomes([self.plan.tasks[node, chunk].key]):
+                for _, outcome in ledger.outcomes([self.plan.task(node, chunk).key]):
                     numbers, success = outcome.arrays["episode"], outcome.arrays["success"]
                     for number, succeeded in zip(numbers.tolist(), success.tolist(), strict=True):
                         accomplished[number] = accomplished.get(number, 0) + succeeded

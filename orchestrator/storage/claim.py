@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 
 from analysis.schema import SEPARATOR, SPEC
 from orchestrator.benchmarks.registry import ENTRIES
-from orchestrator.errors import ChangedError
+from orchestrator.errors import ChangedError, UsageError
 from orchestrator.spec.methods import first_method, method_label, method_of
 from orchestrator.spec.spec import Spec, TableSpec, differences, plain_spec, spec_from_plain
 from orchestrator.spec.structure import Plain, to_plain
@@ -19,7 +19,10 @@ IDENTITY = "identity.json"
 
 
 def spec_of(directory: RunDirectory) -> Spec:
-    """The spec a directory was made for. UsageError where there is no run."""
+    """The spec a directory was made for. UsageError where there is no run, or there are several."""
+    if directory.is_suite:
+        parts = ", ".join(str(part.path) for part in directory.parts.values())
+        raise UsageError(f"{directory.path} holds several runs; name one of {parts}")
     return spec_from_plain(directory.asked()["spec"], str(directory.path / SPEC))
 
 

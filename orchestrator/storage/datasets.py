@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from analysis.studies.data import left_out
 from orchestrator.spec.structure import Plain
 from orchestrator.storage.store import Artifact, Store
 from orchestrator.work.plan import Plan
@@ -36,5 +37,4 @@ def undemonstrated_skills(plan: Plan, store: Store) -> list[str]:
         return []
     datasets = [store.read(*each) for each in needed]
     shown = {skill for dataset in datasets for skill in demonstrated(plan, dataset)}
-    asked = {skill for task in plan.spec.all_tasks for skill in task}
-    return [skill for skill in plan.spec.skill_names if skill in asked - shown]
+    return left_out(plan.spec.skill_names, plan.spec.all_tasks, shown)

@@ -71,10 +71,10 @@ class Trainings:
         recipe = self.recipes[key]
         seed = f", seed {recipe.params['seed']}" if "seed" in recipe.params else ""
         line = f"{recipe.kind}{seed}: {news.done:,} of {news.updates:,} updates"
-        then, done = self._before.get(key, (now, news.done))
+        then, done = self._before.setdefault(key, (now, news.done))
         if news.done > done:
             line += f" ({(news.done - done) / (now - then):.0f}/s)"
-        if not done < news.done < news.updates:  # the first look, or another attempt
+        elif news.done < done:  # another attempt
             self._before[key] = now, news.done
         losses = [f"{name} {value:.3g}" for name, value in news.losses.items()]
         return ", ".join([line, *losses[:1]])

@@ -103,9 +103,9 @@ class Plan:
     def tasks(self) -> dict[tuple[Node, int], BlockTask]:
         """Every block by node and chunk, parents first."""
         return {
-            (node, chunk): self._task(node, episodes)
+            (node, chunk): self.task(node, chunk)
             for node in self.nodes
-            for chunk, episodes in enumerate(self.chunks)
+            for chunk in range(len(self.chunks))
         }
 
     @cached_property
@@ -135,7 +135,8 @@ class Plan:
         methods = dict.fromkeys(node.method for node in self.nodes)
         return {method: MethodBlocks.of(self.spec, method) for method in methods}
 
-    def _task(self, node: Node, episodes: tuple[int, int]) -> BlockTask:
+    def task(self, node: Node, chunk: int) -> BlockTask:
+        """One block, without naming all others."""
         alike = self.method_blocks[node.method]
         place: dict[str, Any] = {
             "benchmark": self.spec.benchmark,
@@ -143,7 +144,7 @@ class Plan:
             "seed": node.seed,
             "method": alike.name,
             "prefix": node.prefix,
-            "episodes": episodes,
+            "episodes": self.chunks[chunk],
             "step_limit": self.spec.step_limit,
             "artifacts": {kind: self.models[kind, node.seed, node.method] for kind in alike.models},
         }

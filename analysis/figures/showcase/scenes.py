@@ -55,8 +55,6 @@ VIEWS = {
 }
 
 
-NO_DRAWING = "recordings of the kind {!r} cannot be drawn here"
-
 T = TypeVar("T")
 
 
@@ -64,7 +62,7 @@ def drawing_of(drawings: Mapping[str, T], showcase: Mapping[str, Any]) -> T:
     """What draws a recording. NoPictureError where nothing here does."""
     kind = kind_of(showcase)
     if kind not in drawings:
-        raise NoPictureError(NO_DRAWING.format(kind))
+        raise NoPictureError(f"recordings of the kind {kind!r} cannot be drawn here")
     return drawings[kind]
 
 

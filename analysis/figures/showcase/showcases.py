@@ -12,7 +12,6 @@ from analysis.figures.showcase.frames import render_frames
 from analysis.figures.showcase.maze import draw_showcase
 from analysis.figures.showcase.physics import draw_sheet, draw_values, segment_labels, sheet_steps
 from analysis.figures.showcase.scenes import (
-    NO_DRAWING,
     VIEWS,
     NoPictureError,
     drawing_of,
@@ -20,7 +19,7 @@ from analysis.figures.showcase.scenes import (
 )
 from analysis.figures.style import house_style, save
 from analysis.run import Run
-from analysis.schema import RunSpec, kind_of
+from analysis.schema import RunSpec
 
 SHOWCASE_CAPTION = (
     "As Figure 1 of the paper: demonstrated skills (left), then whole episodes, the skill in "
@@ -63,11 +62,13 @@ def draw_showcases(run: Run, folder: Path) -> list[Drawn]:
     """Of every part, or of the run itself."""
     drawn = []
     for part, showcase in run.showcases.items():
-        shown, kind = _Shown(part, showcase, run.spec), kind_of(showcase)
-        if kind in SHOWCASES:
-            drawn += SHOWCASES[kind](shown, folder)
+        shown = _Shown(part, showcase, run.spec)
+        try:
+            draw = drawing_of(SHOWCASES, showcase)
+        except NoPictureError as error:
+            drawn.append(shown.drawn("showcase", "", f"no picture: {error}"))
         else:
-            drawn.append(shown.drawn("showcase", "", f"no picture: {NO_DRAWING.format(kind)}"))
+            drawn += draw(shown, folder)
     return drawn
 
 
