@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := stitching orchestrator sweeps analysis tests docs
 
-.PHONY: help setup reproduce test lint bench docs wheel clean browser constraints
+.PHONY: help setup reproduce test campaign lint bench docs wheel clean browser constraints
 
 help:  ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 14
@@ -24,6 +24,9 @@ reproduce: setup  ## Table 1 at full scale; resumes when run again
 
 test: setup browser  ## all tests, the slow tail included
 	SKILLSTITCH_REQUIRE_BROWSER=1 $(BIN)/pytest -n 2 --dist worksteal
+
+campaign: setup  ## every fault we know of, thousands of times, in at most 20 minutes
+	$(BIN)/python -m tests.campaign
 
 lint: setup  ## style and types
 	$(BIN)/ruff check $(SOURCES)

@@ -28,6 +28,11 @@ SHOWCASE = "showcase.json"  # a task step by step
 DIAGNOSIS = "diagnosis.json"  # models judged on held-out data
 STITCHES = "stitches.json"  # the study of stitches
 
+WRITTEN = (
+    PROVENANCE, SEGMENTS, EPISODES, QUARANTINE, TRAINING, DATASETS, SHOWCASE, DIAGNOSIS, STITCHES,
+)  # fmt: skip
+"""Those that are written when all is played, from what was played: they can be written again."""
+
 EPISODE_COLUMNS = {
     "episode": "int64",
     "success": "bool",

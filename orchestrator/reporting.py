@@ -22,6 +22,7 @@ def report_again(run: Path, results: Path | None, *, force: bool) -> Iterator[st
     directory = RunDirectory(run)
     suite = directory.is_suite
     with directory.locked(), said_to_users():
+        played = directory.played
         if suite:
             from orchestrator.storage.merge import merge_again
 
@@ -30,6 +31,8 @@ def report_again(run: Path, results: Path | None, *, force: bool) -> Iterator[st
             build_report(run)
         else:  # builds it, too
             yield from _export(run, results, force)
+        if played:
+            directory.mark(finished=True)
     yield f"wrote {run / 'report' / 'index.html'}"
 
 

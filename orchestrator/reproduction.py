@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -154,24 +154,25 @@ def _carry_out(
 ) -> bool:
     """Build and play whatever is missing, and write it up; False where nothing was missing."""
     plan = make_plan(spec)
-    store, ledger = Store(settings.store), directory.ledger()
-    present = verified_artifacts(plan, store, ledger, progress)
-    if directory.played and present >= plan.needed:
-        if directory.finished:
-            return False
-    else:
-        directory.mark(finished=False)
-        facts: Plain = {"run_id": run_id}
-        directory.write_json(PROVENANCE, provenance() | facts)
-        facts |= _work(plan, settings, directory, store, ledger, present, progress, watch)
-        with storage_errors(directory.path):
-            counts = write_readable(plan, store, ledger, directory)
-            episodes = write_episodes(directory.path)
-            counts["episodes"] = len(episodes)
-            counts["environment steps without the tree"] = int(episodes["steps"].sum())
-            watch.lap("writing")
-            facts |= {"seconds": watch.rounded(), "counts": counts}
+    store = Store(settings.store)
+    with closing(directory.ledger()) as ledger:
+        present = verified_artifacts(plan, store, ledger, progress)
+        if directory.played and present >= plan.needed:
+            if directory.finished:
+                return False
+        else:
+            directory.mark(finished=False)
+            facts: Plain = {"run_id": run_id}
             directory.write_json(PROVENANCE, provenance() | facts)
+            facts |= _work(plan, settings, directory, store, ledger, present, progress, watch)
+            with storage_errors(directory.path):
+                counts = write_readable(plan, store, ledger, directory)
+                episodes = write_episodes(directory.path)
+                counts["episodes"] = len(episodes)
+                counts["environment steps without the tree"] = int(episodes["steps"].sum())
+                watch.lap("writing")
+                facts |= {"seconds": watch.rounded(), "counts": counts}
+                directory.write_json(PROVENANCE, provenance() | facts)
     with storage_errors(directory.path):
         build_report(directory.path)
     directory.mark(finished=True)
@@ -213,6 +214,7 @@ def _work(
         executor.close()
         if announcement is not None:
             announcement.join()
+        shared.close()
     watch.lap("stopping workers")
     return {
         "executor": settings.executor,

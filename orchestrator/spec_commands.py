@@ -143,7 +143,7 @@ def run(words: list[str], output: Console, errors: Console) -> None:
         try:
             reproduce_asked(asked, settings, progress)
         except IncompleteError as error:
-            if not (out / "finished").is_file():
+            if not RunDirectory(out).written:
                 raise
             incomplete = error
     if command.results is not None:

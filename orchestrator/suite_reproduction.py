@@ -80,7 +80,7 @@ def _carry_out_parts(
                 reproduce(part.spec, replace(settings, out=directory.path), progress)
             except SkillstitchError as error:
                 gave_up = isinstance(error, IncompleteError)
-                if not (gave_up and (directory.path / "finished").is_file()):
+                if not (gave_up and directory.written):
                     raise type(error)(f"part {part.label}: {error}") from error
                 partial.append(part.label)
             watch.lap(f"part {part.label}")

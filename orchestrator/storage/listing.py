@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from analysis.schema import QUARANTINE, SPEC
-from orchestrator.errors import UsageError
+from orchestrator.errors import StorageError, UsageError
 from orchestrator.spec.structure import Plain
 from orchestrator.storage.rundir import RunDirectory
 
@@ -47,7 +47,7 @@ def _row(folder: Path) -> tuple[str, str, str, str]:
         asked = sweep or directory.asked()
         what = f"{asked['name']} at {asked['scale']} scale"
         state = _progress(directory, sweep) if sweep else _state(directory)
-    except (ValueError, KeyError):
+    except (StorageError, KeyError):
         what, state = "unreadable", "its spec.json is damaged, or of another version"
     newest = max(path.stat().st_mtime for path in folder.iterdir())
     when = datetime.fromtimestamp(newest, UTC).strftime("%Y-%m-%d %H:%M UTC")

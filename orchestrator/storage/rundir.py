@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import analysis
-from analysis.schema import QUARANTINE, SPEC
-from orchestrator.errors import UsageError
+from analysis.schema import QUARANTINE, SPEC, WRITTEN
+from orchestrator.errors import StorageError, UsageError
 from orchestrator.spec.structure import Plain
 from orchestrator.storage import locking
 from orchestrator.storage.ledger import Ledger
 from orchestrator.storage.store import USUAL_STORE, write_atomically
 
+FINISHED = "finished"
 PLANNED = "plan.json"
 SWEEP = "sweep.json"
 REPORT_SOURCES = (".py", ".csv", ".html", ".css", ".js")
@@ -36,7 +37,7 @@ class RunDirectory:
     tracking.json     what MLflow has seen
     episodes/         films of single episodes
     seconds.json      where the time of the last command that did any work went
-    finished          there when all of the above is
+    finished          there when all of the above is: digests of what was written
     """
 
     def __init__(self, path: Path) -> None:
@@ -59,21 +60,60 @@ class RunDirectory:
             self.write_json("store.json", path)
 
     @property
+    def written(self) -> bool:
+        """Whether an end was come to, blocks given up or not, and all readable files written."""
+        return bool(self._mark())
+
+    @property
     def played(self) -> bool:
-        """Whether everything is played and written, with nothing given up."""
-        return (self.path / "finished").is_file() and not self.read_json(QUARANTINE)
+        """Whether everything is played and written, undamaged, with nothing given up."""
+        mark = self._mark()
+        return bool(mark) and self._intact(mark["written"]) and not self.read_json(QUARANTINE)
 
     @property
     def finished(self) -> bool:
-        """Whether, moreover, the report is the one that today's analysis would write."""
-        return self.played and (self.path / "finished").read_text() == analysis_fingerprint()
+        """Whether, moreover, the report is there, undamaged, as today's analysis would write it."""
+        mark = self._mark()
+        return (
+            self.played
+            and mark["analysis"] == analysis_fingerprint()
+            and self._intact(mark["report"])
+        )
 
     def mark(self, *, finished: bool) -> None:
         """Say that the readable files are complete, or that they are about to change."""
-        if finished:
-            write_atomically(self.path / "finished", analysis_fingerprint().encode())
-        else:
-            (self.path / "finished").unlink(missing_ok=True)
+        if not finished:
+            (self.path / FINISHED).unlink(missing_ok=True)
+            return
+        written = [self.path / name for name in WRITTEN]
+        report = sorted((self.path / "report").rglob("*"))
+        self.write_json(
+            FINISHED,
+            {
+                "analysis": analysis_fingerprint(),
+                "written": self._digests(written),
+                "report": self._digests(report),
+            },
+        )
+
+    def _mark(self) -> Plain:
+        """What `mark` has written; nothing where it has not, or where that is damaged."""
+        try:
+            mark = self.read_json(FINISHED)
+        except StorageError:
+            return {}
+        complete = isinstance(mark, dict) and {"analysis", "written", "report"} <= mark.keys()
+        return mark if complete else {}
+
+    def _digests(self, files: list[Path]) -> dict[str, str]:
+        return {
+            str(file.relative_to(self.path)): hashlib.sha256(file.read_bytes()).hexdigest()
+            for file in files
+            if file.is_file()
+        }
+
+    def _intact(self, digests: Plain) -> bool:
+        return self._digests([self.path / name for name in digests]) == digests
 
     def locked(self) -> AbstractContextManager[None]:
         """Hold the directory; LockedError at once, naming the holder, if somebody else does."""
@@ -84,7 +124,7 @@ class RunDirectory:
         path = self.path / SPEC
         if not path.is_file():
             raise UsageError(f"{self.path} is no run directory: it has no spec.json")
-        plain: Plain = json.loads(path.read_text())
+        plain: Plain = self.read_json(SPEC)
         return plain
 
     @property
@@ -113,10 +153,17 @@ class RunDirectory:
         write_atomically(self.path / name, (text + "\n").encode(errors="surrogateescape"))
 
     def read_json(self, name: str) -> Any:
+        """None where there is no such file. Raises StorageError for one that is damaged."""
         path = self.path / name
         if not path.is_file():
             return None
-        return json.loads(path.read_text(encoding="utf-8", errors="surrogateescape"))
+        try:
+            return json.loads(path.read_text(encoding="utf-8", errors="surrogateescape"))
+        except ValueError as error:
+            raise StorageError(
+                f"{path} is damaged: {error}; move it away and run the same command again, or "
+                "choose another --out (finished artifacts and blocks are in the store)"
+            ) from error
 
 
 def analysis_fingerprint() -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from orchestrator import tracking
 from orchestrator.errors import LockedError
 from orchestrator.storage.rundir import RunDirectory
+from orchestrator.tracking.receipt import read_receipt
 
 NO_TRACKING = "none"
 
@@ -24,16 +25,16 @@ def catch_up(directory: RunDirectory) -> str:
 
     A run under way is left to its own process.
     """
-    receipt = directory.read_json("tracking.json")
+    receipt = read_receipt(directory.path)
     if receipt is None:
         return ""
     try:
         with directory.locked():
             return publish(
                 directory,
-                receipt["uri"],
+                receipt.uri,
                 finished=directory.played,
-                failed=receipt["status"] == "FAILED" and not directory.played,
+                failed=receipt.status == "FAILED" and not directory.played,
             )
     except LockedError:
         return ""

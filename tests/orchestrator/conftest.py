@@ -1,6 +1,5 @@
 """One finished tiny run a session, and copies of it to damage."""
 
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -40,18 +39,13 @@ def finished(spec: Spec, tmp_path_factory: pytest.TempPathFactory) -> Place:
 @pytest.fixture
 def done(finished: Place, tmp_path: Path) -> Place:
     """A copy of the finished run, to do with as a test likes."""
-    shutil.copytree(finished.root, tmp_path / "done")
-    return Place(tmp_path / "done")
+    return finished.copied(tmp_path / "done")
 
 
 @pytest.fixture
 def trained(finished: Place, tmp_path: Path) -> Place:
     """Every artifact is there, nothing is played yet."""
-    place = Place(tmp_path / "trained")
-    shutil.copytree(
-        finished.store_root, place.store_root, ignore=shutil.ignore_patterns("blocks.sqlite*")
-    )
-    return place
+    return finished.trained(tmp_path / "trained")
 
 
 @pytest.fixture(scope="session")

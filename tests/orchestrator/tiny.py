@@ -1,5 +1,8 @@
 """What the orchestrator's tests share: a tiny reproduction, and its promised bytes."""
 
+from __future__ import annotations
+
+import shutil
 import sqlite3
 from collections import Counter
 from contextlib import closing
@@ -114,6 +117,17 @@ class Place:
             return ledger.finished()
         finally:
             ledger.close()
+
+    def copied(self, root: Path) -> Place:
+        """Everything, elsewhere."""
+        shutil.copytree(self.root, root)
+        return Place(root)
+
+    def trained(self, root: Path) -> Place:
+        """Elsewhere, with all artifacts, and nothing played."""
+        unplayed = shutil.ignore_patterns("blocks.sqlite*")
+        shutil.copytree(self.store_root, root / "store", ignore=unplayed)
+        return Place(root)
 
     def carry_out(self, spec: Spec, progress: Silent | None = None) -> RunDirectory:
         return carry_out(spec, serially(self.out, self.store_root), progress)
