@@ -33,12 +33,18 @@ class HoldShooting(Bounded):
 
     @torch.no_grad()
     def plan(
-        self, score: Score, streams: Sequence[np.random.Generator], actions: ActionSpace
+        self,
+        score: Score,
+        streams: Sequence[np.random.Generator],
+        actions: ActionSpace,
+        start: torch.Tensor | None = None,
     ) -> PlannedActions:
         drawn = np.empty((len(streams), self.population, 1, actions.size), dtype=np.float32)
         for row, stream in zip(drawn, streams, strict=True):
             row[:] = actions.uniform(stream, (self.population, 1))
         sequences = torch.from_numpy(drawn.repeat(self.horizon, axis=2))
+        if start is not None:
+            sequences[:, 0] = start
         problems = torch.arange(len(streams))
         scores = sortable(score(problems, sequences), problems)
         best = scores.argmax(dim=1)

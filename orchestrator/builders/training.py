@@ -14,6 +14,7 @@ from stitching.data.corrections import Corrections
 from stitching.data.experience import skill_experience
 from stitching.data.initiation import initiation_set, pose_scale
 from stitching.data.mixtures import mixed_experience, skill_pairs
+from stitching.data.robot import RobotModel, before_contact
 from stitching.data.swapping import Swapping
 from stitching.data.transitions import Transitions, check, concatenate
 from stitching.data.uncut import uncut_experience
@@ -129,7 +130,7 @@ def _dynamics(params: Plain, inputs: Inputs) -> Artifact:
 
 
 def _initiation_sets(params: Plain, inputs: Inputs) -> Artifact:
-    """Every skill's initiation set, in one artifact: see `Initiation.of`."""
+    """Every skill's initiation set, and how the robot moves: see `Initiation.of`."""
     benchmark, data = _checked_data(params, inputs)
     factors = structure(Factors, params["factors"], "factors")
     sets = [initiation_set(data, factors, skill) for skill in range(len(benchmark.skills))]
@@ -141,6 +142,12 @@ def _initiation_sets(params: Plain, inputs: Inputs) -> Artifact:
     for number, (skill, one) in enumerate(zip(benchmark.skills, sets, strict=True)):
         arrays[f"states.{number}"] = one.states
         arrays[f"others.{number}"] = np.array(factors.others_than(skill.name), dtype=np.int64)
+    if not benchmark.actions.discrete:
+        free = before_contact(data, factors, [skill.name for skill in benchmark.skills])
+        model = RobotModel.of(data, free, factors)
+        arrays["robot.columns"] = model.columns
+        for name in ("drift", "effect", "offset"):
+            arrays[f"robot.{name}"] = getattr(model, name).astype(np.float32)
     return Artifact(arrays, {"sizes": [len(one.states) for one in sets]})
 
 
@@ -154,6 +161,8 @@ TRAINING_BUILDERS = {
     "single-policy": Builder(
         _single_policy, ("stitching.models.iql", "stitching.data.uncut"), SETUP
     ),
-    "initiation-sets": Builder(_initiation_sets, ("stitching.data.initiation",), SETUP),
+    "initiation-sets": Builder(
+        _initiation_sets, ("stitching.data.initiation", "stitching.data.robot"), SETUP
+    ),
     "dynamics": Builder(_dynamics, ("stitching.models.dynamics",), SETUP),
 }

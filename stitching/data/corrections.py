@@ -15,14 +15,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from stitching.data.swapping import STILL, usual_moves
+from stitching.data.robot import RobotModel, before_contact
 from stitching.data.transitions import DataError, Transitions
-from stitching.envs.factors import NO_OBJECT, Factors
+from stitching.envs.factors import Factors
 
 SHARE = 0.5  # of the transitions in which the robot may be displaced
 STEPS_BACK = 3  # a corrected action brings the robot back by one of so many equal parts
 FARTHEST = 3  # deviations by which a number is displaced at most
-KNOWN = 0.9  # of a number's variance: what is explained by less is left as it is
 
 
 @dataclass(frozen=True)
@@ -68,25 +67,21 @@ class Corrections:
         changes. Raises DataError where that holds for none.
         """
         free = before_contact(data, factors, skills)
-        robot = np.flatnonzero(factors.object_of(data.observations.shape[1]) == NO_OBJECT)
-        states = data.observations[free][:, robot].astype(np.float64)
-        changes = data.next_observations[free][:, robot] - states
-        causes = np.concatenate([states, data.actions[free], np.ones((len(states), 1))], axis=1)
-        solution, *_ = np.linalg.lstsq(causes, changes, rcond=None)
-        errors = changes - causes @ solution
-        known = errors.var(axis=0) < (1 - KNOWN) * changes.var(axis=0)
-        drift = solution[: len(robot)].T  # (robot, robot)
-        effect = solution[len(robot) : -1].T  # (robot, action)
+        model = RobotModel.of(data, free, factors)
+        robot, known = model.columns, model.explained
         displaced = known & np.isin(robot, factors.pose)
         if not displaced.any():
             raise DataError("corrections: the data do not tell how actions move the robot")
+        pose = robot[displaced]
+        before = data.observations[free][:, pose].astype(np.float64)
+        changes = data.next_observations[free][:, pose] - before
         return cls(
-            steps * np.sqrt(np.square(changes[:, displaced]).mean(axis=0)),
-            robot[displaced],
+            steps * np.sqrt(np.square(changes).mean(axis=0)),
+            pose,
             robot[known],
-            drift[np.ix_(known, displaced)],
-            effect[known],
-            np.linalg.pinv(effect[displaced]),
+            model.drift[np.ix_(known, displaced)],
+            model.effect[known],
+            np.linalg.pinv(model.effect[displaced]),
             free,
             data.observations.shape[1],
         )
@@ -111,22 +106,3 @@ class Corrections:
         reach[self.robot] += FARTHEST * np.abs(self.drift) @ self.deviations
         reach[self.pose] += FARTHEST * self.deviations
         return (low - reach).astype(np.float32), (high + reach).astype(np.float32)
-
-
-def before_contact(data: Transitions, factors: Factors, skills: Sequence[str]) -> np.ndarray:
-    """Transitions until a demonstration moves the object that its skill is about, (N,) bool.
-
-    That is, by more than a tenth of what it usually moves, from where it stood at first. A hand
-    that holds an object cannot be displaced alone. All transitions where a skill is about nothing.
-    """
-    usual = usual_moves(data, factors, skills)
-    free = np.ones(len(data), dtype=bool)
-    starts = data.episode_starts
-    for start, end, skill in zip(starts, data.episode_ends, data.episode_skills, strict=True):
-        own = factors.own.get(skills[skill]) if skill >= 0 else None
-        if own is not None:
-            where = data.next_observations[start:end, list(factors.objects[own].positions)]
-            first = data.observations[start, list(factors.objects[own].positions)]
-            moved = np.abs(where - first).max(axis=1) > STILL * usual[factors.names.index(own)]
-            free[start:end] = ~np.logical_or.accumulate(moved)
-    return free

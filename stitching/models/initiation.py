@@ -1,4 +1,4 @@
-"""The initiation sets of all skills, ready to be asked how far a robot is from them."""
+"""The initiation sets of all skills: how far a robot is from them, and what brings it nearer."""
 
 from __future__ import annotations
 
@@ -6,6 +6,43 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+
+
+@dataclass(frozen=True)
+class Steering:
+    """`stitching.data.robot`'s model, x' = x + A x + B a + c, and what brings a pose about."""
+
+    robot: list[int]  # columns of an observation: x
+    drift: torch.Tensor  # (robot, robot) A
+    effect: torch.Tensor  # (robot, action) B
+    offset: torch.Tensor  # (robot,) c
+    pose: list[int]  # which of x make the pose
+    back: torch.Tensor  # (action, pose) B⁺ of the pose
+
+    @classmethod
+    def of(cls, arrays: dict[str, np.ndarray]) -> Steering:
+        """From the artifact: columns, "robot.columns", "robot.drift", "robot.effect", ….offset."""
+        robot = arrays["robot.columns"].tolist()
+        pose = [robot.index(column) for column in arrays["columns"].tolist()]
+        drift, effect, offset = (
+            torch.from_numpy(arrays[f"robot.{name}"]) for name in ("drift", "effect", "offset")
+        )
+        return cls(robot, drift, effect, offset, pose, torch.linalg.pinv(effect[pose]))
+
+    def towards(self, states: torch.Tensor, poses: torch.Tensor, horizon: int) -> torch.Tensor:
+        """Actions that bring robots to poses as fast as they can, as far as the model knows.
+
+        a_t = clip(B⁺ (pose − what the robot comes to by itself), −1, 1).
+
+        states: (n, observation). poses: (n, pose). Returns (n, horizon, action).
+        """
+        x, steps = states[:, self.robot], []
+        for _ in range(horizon):
+            alone = x + x @ self.drift.T + self.offset
+            action = ((poses - alone[:, self.pose]) @ self.back.T).clamp(-1, 1)
+            x = alone + action @ self.effect.T
+            steps.append(action)
+        return torch.stack(steps, dim=1)
 
 
 @dataclass(frozen=True)
@@ -17,10 +54,14 @@ class Initiation:
     states: list[torch.Tensor]  # by skill: (P, observation); none where nothing is known
     others: list[list[int]]  # by skill: columns of the objects that it is not about
     radii: list[float]  # ε by skill
+    steering: Steering | None = None  # none where actions are discrete
 
     @classmethod
     def of(cls, arrays: dict[str, np.ndarray]) -> Initiation:
-        """From the artifact: columns, scale, radii, "states.<skill>", "others.<skill>"."""
+        """From the artifact: columns, scale, radii, "states.<skill>", "others.<skill>".
+
+        And the robot's model, where it has one: see `Steering.of`.
+        """
         radii = arrays["radii"].tolist()
         return cls(
             arrays["columns"].tolist(),
@@ -28,6 +69,7 @@ class Initiation:
             [torch.from_numpy(arrays[f"states.{skill}"]) for skill in range(len(radii))],
             [arrays[f"others.{skill}"].tolist() for skill in range(len(radii))],
             radii,
+            Steering.of(arrays) if "robot.effect" in arrays else None,
         )
 
     def distances(self, states: torch.Tensor, skill: int) -> torch.Tensor:
@@ -48,9 +90,19 @@ class Initiation:
         Those that the skill is not about are as in that state of the set whose pose is nearest.
         """
         placed = states.clone()
-        nearest = self.states[skill][self._gaps(states, skill).argmin(dim=1)]
-        placed[:, self.others[skill]] = nearest[:, self.others[skill]]
+        placed[:, self.others[skill]] = self._nearest(states, skill)[:, self.others[skill]]
         return placed
+
+    def towards(self, states: torch.Tensor, skill: int, horizon: int) -> torch.Tensor | None:
+        """`Steering.towards` the nearest pose of the set: (n, horizon, action), or None without."""
+        if self.steering is None:
+            return None
+        poses = self._nearest(states, skill)[:, self.columns]
+        return self.steering.towards(states, poses, horizon)
+
+    def _nearest(self, states: torch.Tensor, skill: int) -> torch.Tensor:
+        """The states of the set whose poses are nearest: (n, observation) → (n, observation)."""
+        return self.states[skill][self._gaps(states, skill).argmin(dim=1)]
 
     def outside(self, states: torch.Tensor, skill: int) -> torch.Tensor:
         """Which states are farther than ε from the set, (n, observation) → (n,) bool."""

@@ -55,9 +55,16 @@ class Planner(Protocol):
         ...
 
     def plan(
-        self, score: Score, streams: Sequence[np.random.Generator], actions: ActionSpace
+        self,
+        score: Score,
+        streams: Sequence[np.random.Generator],
+        actions: ActionSpace,
+        start: torch.Tensor | None = None,
     ) -> PlannedActions:
         """One plan for each stream.
+
+        start: (problems, horizon, action), what is known to be a fair plan: the search begins
+        around it, or tries it as well. None: it begins as it does by itself.
 
         A problem draws from its own stream only, and only as much as it needs itself, so its
         plan does not depend on which other problems share the batch.

@@ -29,11 +29,17 @@ class RandomShooting(Bounded):
         return True
 
     def plan(
-        self, score: Score, streams: Sequence[np.random.Generator], actions: ActionSpace
+        self,
+        score: Score,
+        streams: Sequence[np.random.Generator],
+        actions: ActionSpace,
+        start: torch.Tensor | None = None,
     ) -> PlannedActions:
         with torch.no_grad():
             problems = torch.arange(len(streams))
             sequences = self._draw(streams, actions)
+            if start is not None:
+                sequences[:, 0] = start
             scores = sortable(score(problems, sequences), problems)
             best = scores.argmax(dim=1)
             return PlannedActions(

@@ -96,6 +96,20 @@ class PlannerConformance:
             planner.plan(only(exact_bowls, torch.tensor([i])), [by_itself[i]], space)
         assert [s.random() for s in in_company] == [s.random() for s in by_itself]
 
+    def test_a_plan_that_it_is_given_is_made_use_of(
+        self, planner: Planner, space: ActionSpace
+    ) -> None:
+        """Begun at the best plan that there is, a search ends no worse than by itself."""
+        actions = space.uniform(streams(1)[0], (PROBLEMS, planner.horizon))
+        fair = torch.from_numpy(np.asarray(actions, dtype=np.float32))
+
+        def score(problems: torch.Tensor, actions: torch.Tensor) -> torch.Tensor:
+            return -(actions - fair[problems, None]).abs().amax(dim=(2, 3))
+
+        begun = planner.plan(score, streams(), space, fair)
+        by_itself = planner.plan(score, streams(), space)
+        assert (begun.objective >= by_itself.objective - 1e-3).all()
+
     def test_nothing_to_plan(self, planner: Planner, space: ActionSpace) -> None:
         plan = planner.plan(exact_bowls, [], space)
         assert plan.actions.shape == (0, planner.horizon, space.size)

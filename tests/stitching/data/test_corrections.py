@@ -5,44 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stitching.data.corrections import STEPS_BACK, Corrections, before_contact
-from stitching.data.transitions import Transitions, concatenate
-from stitching.envs.factors import Factors, Object
+from stitching.data.corrections import STEPS_BACK, Corrections
 from stitching.streams import stream
+from tests.stitching.data.made_up import DATA, EFFECT, FACTORS, SAG, SKILLS
 
-# A robot of two joints (0, 1), a finger that only trembles (2), their velocities (3, 4), a door (5)
-# and a cup (6).
-FACTORS = Factors(
-    (0, 1, 2),
-    {"door": Object((5,)), "cup": Object((6,))},
-    own={"open": "door", "fill": "cup"},
-)
-SKILLS = ("open", "fill", "wave")
-EFFECT = np.array([[0.1, 0.02], [0.0, 0.05]])  # of two actions on the two joints
-SAG = 0.05  # of a joint's distance from 0, lost in a step
-STEPS, TOUCHED = 20, 12
-
-
-def made_up(skill: int, moved: int | None, seed: int) -> Transitions:
-    """One episode of a robot that does as it is told; column `moved` moves from step TOUCHED on."""
-    rng = stream("made up", skill, seed)
-    actions = rng.uniform(-0.6, 0.6, size=(STEPS, 2))
-    states = np.zeros((STEPS + 1, 7))
-    states[:, [5, 6]] = rng.normal(size=2)
-    states[0, :2] = rng.normal(size=2)
-    for step, action in enumerate(actions):
-        states[step + 1, :2] = (1 - SAG) * states[step, :2] + EFFECT @ action
-        states[step + 1, 3:5] = EFFECT @ action
-    states[:, 2] = rng.normal(scale=0.01, size=STEPS + 1)
-    if moved is not None:
-        states[TOUCHED:, moved] += np.linspace(0.2, 1, STEPS + 1 - TOUCHED)
-    states = states.astype(np.float32)
-    ends, success = np.array([STEPS]), np.array([True])
-    actions = actions.astype(np.float32)
-    return Transitions(states[:-1], actions, states[1:], ends, np.array([skill]), success)
-
-
-DATA = concatenate([made_up(skill, (5, 6, None)[skill], n) for skill in range(3) for n in range(8)])
 CORRECTIONS = Corrections.of(DATA, FACTORS, SKILLS, 1.5)
 ROWS = np.arange(len(DATA)).repeat(20)
 DRAWN = CORRECTIONS.draw(ROWS, DATA.actions[ROWS], stream("displacements"))
@@ -77,13 +43,7 @@ def test_a_third_of_the_way_back_where_the_action_allows_it() -> None:
 
 
 def test_only_the_robot_and_only_before_it_moves_the_object() -> None:
-    free = before_contact(DATA, FACTORS, SKILLS)
-    by_episode = free.reshape(len(DATA.episode_ends), STEPS)
-    waves = DATA.episode_skills == 2
-    assert by_episode[waves].all()
-    # The transition that ends in the first moved state is not free, nor is any later one.
-    assert by_episode[~waves, : TOUCHED - 1].all()
-    assert not by_episode[~waves, TOUCHED - 1 :].any()
+    free = CORRECTIONS.free
     assert not DRAWN.now[:, [2, 3, 4, 5, 6]].any()
     assert not DRAWN.following[:, [2, 5, 6]].any()
     assert not DRAWN.actions[~DISPLACED].any()
@@ -104,12 +64,6 @@ def test_all_that_is_drawn_lies_in_the_widened_range() -> None:
     as_seen = [2, 5, 6]  # the finger and the objects
     assert np.array_equal(low[as_seen], both.min(axis=0)[as_seen])
     assert np.array_equal(high[as_seen], both.max(axis=0)[as_seen])
-
-
-def test_the_accident_of_another_object_does_not_end_it() -> None:
-    accident = made_up(0, 6, seed=9)
-    free = before_contact(concatenate([DATA, accident]), FACTORS, SKILLS)
-    assert free[len(DATA) :].all()
 
 
 def test_a_robot_that_does_not_do_as_it_is_told_is_refused() -> None:

@@ -10,7 +10,7 @@ from stitching.envs.protocol import ActionSpace
 from stitching.methods.protocol import Models
 from stitching.methods.reach_stitch import ReachStitch, ReachStitchSettings
 from stitching.models.dynamics import Dynamics, DynamicsConfig
-from stitching.models.initiation import Initiation
+from stitching.models.initiation import Initiation, Steering
 from stitching.planning.cem import CEM
 from stitching.streams import stream
 
@@ -135,3 +135,51 @@ def test_it_plans_among_the_objects_of_the_nearest_start() -> None:
     assert np.array_equal(proposed(SETS, states), proposed(SETS, known))
     gaps = np.abs(proposed(SETS, states) - as_they_are)[:, 0, 1]
     assert gaps.min() > 0.3
+
+
+# A robot of eight joints that an action moves by 0.1 each, and that sags by 0.01 a step.
+JOINTS = 8
+ARM = ActionSpace(JOINTS, discrete=False)
+STEERING = Steering.of(
+    {
+        "columns": np.arange(JOINTS),
+        "robot.columns": np.arange(JOINTS),
+        "robot.drift": np.zeros((JOINTS, JOINTS), dtype=np.float32),
+        "robot.effect": 0.1 * np.eye(JOINTS, dtype=np.float32),
+        "robot.offset": np.full(JOINTS, -0.01, dtype=np.float32),
+    }
+)
+
+
+def test_steering_goes_there_as_fast_as_actions_can() -> None:
+    states, poses = torch.zeros(1, JOINTS), torch.full((1, JOINTS), 0.15)
+    first, second, third = STEERING.towards(states, poses, 3)[0]
+    assert torch.equal(first, torch.ones(JOINTS))  # 0.09 of 0.15
+    torch.testing.assert_close(second, torch.full((JOINTS,), 0.7))  # the rest
+    torch.testing.assert_close(third, torch.full((JOINTS,), 0.1))  # it stays there
+
+
+def test_a_search_that_is_steered_arrives_sooner() -> None:
+    """Sixteen numbers are many for the samples of a plan."""
+    arrays = {
+        "observation_mean": np.zeros(JOINTS, dtype=np.float32),
+        "observation_std": np.ones(JOINTS, dtype=np.float32),
+        "t.w0": np.concatenate([np.zeros((JOINTS, JOINTS)), 0.1 * np.eye(JOINTS)])[None],
+        "t.b0": np.full((1, 1, JOINTS), -0.01, dtype=np.float32),
+    }
+    arrays["t.w0"] = arrays["t.w0"].astype(np.float32)
+    sets = Initiation(
+        list(range(JOINTS)), torch.ones(JOINTS), [torch.ones(1, JOINTS)], [[]], [0.1], STEERING
+    )
+    trained = {"initiation-sets": sets, "dynamics": Dynamics(arrays, DynamicsConfig())}
+    arrived = {}
+    for steered in (True, False):
+        stitcher = ReachStitch(ReachStitchSettings(steered=steered), Models(ARM, 1, trained))
+        states, steps = torch.zeros(1, JOINTS), 0
+        noise = streams(1)
+        while sets.outside(states, 0).any() and steps < 100:
+            action = torch.from_numpy(stitcher.propose(states, None, 0, noise).actions[:, 0])
+            states, steps = states + 0.1 * action - 0.01, steps + 1
+        arrived[steered] = steps
+    assert arrived[True] <= 14  # at least 11: (1 − 0.03) / 0.09
+    assert arrived[False] > 1.5 * arrived[True]

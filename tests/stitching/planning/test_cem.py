@@ -175,3 +175,23 @@ def test_rejects_what_cannot_work() -> None:
         replace(PLANNER, elites=51)
     with pytest.raises(ValueError, match="elites"):
         replace(PLANNER, elites=0)
+
+
+def test_the_first_samples_lie_around_the_plan_that_it_is_given() -> None:
+    seen: list[Tensor] = []
+
+    def score(problems: Tensor, actions: Tensor) -> Tensor:
+        seen.append(actions)
+        return bowls(problems, actions)
+
+    start = torch.full((len(TARGETS), 3, SIZE), 0.4)
+    planner = replace(PLANNER, iterations=1, initial_std=0.05)
+    planner.plan(score, streams(), SPACE, start)
+    assert (seen[0].mean(dim=1) - start).abs().max() < 0.03
+    assert seen[0].std(dim=1).mean().item() == pytest.approx(0.05, rel=0.1)
+
+
+def test_without_a_plan_it_starts_at_zero() -> None:
+    by_itself = PLANNER.plan(bowls, streams(), SPACE)
+    at_zero = PLANNER.plan(bowls, streams(), SPACE, torch.zeros(len(TARGETS), 3, SIZE))
+    assert torch.equal(by_itself.actions, at_zero.actions)
