@@ -29,7 +29,7 @@ class ReachStitchSettings(PlanningSettings):
     beta: NotNegative = 0.5  # β of Eq. 2, beside a distance in standard deviations
     norm: Norm = "mean"  # as MB-Stitch's
     steered: bool = True  # search around the actions that a linear model of the robot has
-    cem: CEM = CEM(horizon=2, iterations=10, momentum=0.5, tolerance=0.05, initial_std=0.3)
+    cem: CEM = CEM(horizon=2, iterations=10, momentum=0.5, tolerance=0.05, initial_std=0.1)
 
 
 @dataclass(frozen=True)

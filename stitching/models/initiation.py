@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
+from stitching.data.corrections import STEPS_BACK
+
 
 @dataclass(frozen=True)
 class Steering:
@@ -30,17 +32,19 @@ class Steering:
         return cls(robot, drift, effect, offset, pose, torch.linalg.pinv(effect[pose]))
 
     def towards(self, states: torch.Tensor, poses: torch.Tensor, horizon: int) -> torch.Tensor:
-        """Actions that bring robots to poses as fast as they can, as far as the model knows.
+        """Actions that bring robots nearer to poses, as far as the model knows.
 
-        a_t = clip(B⁺ (pose − what the robot comes to by itself), −1, 1).
+        a_t = clip(B⁺ ((p − x_t) / 3 − A x_t − c), −1, 1), p being the pose: with every action a
+        third of what is left, or as much as an action can. All at once would arrive too fast.
 
         states: (n, observation). poses: (n, pose). Returns (n, horizon, action).
         """
         x, steps = states[:, self.robot], []
         for _ in range(horizon):
-            alone = x + x @ self.drift.T + self.offset
-            action = ((poses - alone[:, self.pose]) @ self.back.T).clamp(-1, 1)
-            x = alone + action @ self.effect.T
+            drift = x @ self.drift.T + self.offset
+            wanted = (poses - x[:, self.pose]) / STEPS_BACK - drift[:, self.pose]
+            action = (wanted @ self.back.T).clamp(-1, 1)
+            x = x + drift + action @ self.effect.T
             steps.append(action)
         return torch.stack(steps, dim=1)
 
