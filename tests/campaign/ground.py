@@ -47,20 +47,21 @@ class Ground:
         self.expected = promised_bytes(self.undisturbed.out)
         self._numbers = itertools.count()
 
-    def _folder(self) -> Path:
+    def folder(self) -> Path:
+        """The name of one that is not there yet."""
         return self.root / str(next(self._numbers))
 
     def fresh(self) -> Place:
         """Nothing there yet."""
-        return Place(self._folder())
+        return Place(self.folder())
 
     def trained(self) -> Place:
         """Every artifact is there, nothing is played."""
-        return self.undisturbed.trained(self._folder())
+        return self.undisturbed.trained(self.folder())
 
     def done(self) -> Place:
         """All that the undisturbed run has left."""
-        return self.undisturbed.copied(self._folder())
+        return self.undisturbed.copied(self.folder())
 
     @cached_property
     def outcomes(self) -> dict[str, bytes]:
