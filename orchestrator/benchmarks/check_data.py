@@ -87,9 +87,10 @@ def _range_lines(data: Transitions, benchmark: Benchmark) -> Iterator[str]:
         yield f"  {name:<{width}}  {ours:>18}  {theirs:>21}"
     span = np.maximum(high - low, last - first)
     if (far := np.flatnonzero((first > high + span) | (last < low - span))).size:
+        numbers = ", ".join(map(str, far))
         yield (
-            f"  far from the benchmark's start in all of the data: numbers {', '.join(map(str, far))}"
-            " of an observation; are units and order the benchmark's?"
+            f"  far from the benchmark's start in all of the data: numbers {numbers} of an "
+            "observation; are units and order the benchmark's?"
         )
 
 

@@ -13,7 +13,7 @@ from stitching.data.own.recording import Recording, first_not_finite
 from stitching.data.transitions import DataError
 from stitching.envs.protocol import Benchmark
 
-WORDS: dict[type[np.generic], str] = {
+WORDS: dict[type, str] = {
     np.floating: "floats",
     np.integer: "integers",
     np.str_: "strings",
@@ -25,7 +25,7 @@ WORDS: dict[type[np.generic], str] = {
 class Column:
     """What an array must be: its kind of values, and its width; 0 for one value a row."""
 
-    kind: type[np.generic]
+    kind: type
     width: int = 0
     needed: bool = True
 
