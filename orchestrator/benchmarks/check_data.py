@@ -43,7 +43,7 @@ def check_data_lines(source: str, benchmark: str) -> Iterator[str]:
     artifact = own_data(Recipe(dataset.kind, params))
     data = Transitions(**artifact.arrays)
     yield f"{source}: can be learned from as data of {benchmark}"
-    yield f"{len(data.episode_ends)} demonstrations, {len(data)} transitions"
+    yield f"{len(data.episode_ends)} episodes, {len(data)} transitions"
     yield from _skill_lines(data, entry.benchmark)
     yield from _range_lines(data, entry.benchmark)
     yield from _task_lines(data, entry.benchmark)
