@@ -43,7 +43,8 @@ def check_data_lines(source: str, benchmark: str) -> Iterator[str]:
     artifact = own_data(Recipe(dataset.kind, params))
     data = Transitions(**artifact.arrays)
     yield f"{source}: can be learned from as data of {benchmark}"
-    yield f"{len(data.episode_ends)} episodes, {len(data)} transitions"
+    demonstrations = int((data.episode_skills != NO_SKILL).sum())
+    yield f"{demonstrations} demonstrations of skills; {len(data)} transitions in all"
     yield from _skill_lines(data, entry.benchmark)
     yield from _range_lines(data, entry.benchmark)
     yield from _task_lines(data, entry.benchmark)

@@ -61,7 +61,7 @@ def test_the_script_writes_labelled_data(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.chdir(tmp_path)
     write_own_data(0, lambda observation, skill: np.eye(4, dtype=np.float32)[0])
     lines = list(check_data_lines("mine.npz", "maze"))
-    assert lines[1] == "4 episodes, 160 transitions"
+    assert lines[1] == "4 demonstrations of skills; 160 transitions in all"
     assert "no demonstration accomplishes g0, g1, g2, g3; these tasks ask for one of them:" in lines
 
 

@@ -36,7 +36,7 @@ def test_what_they_hold_is_said_skill_by_skill(check: Check, tmp_path: Path) -> 
     code, said = check(write_maze(tmp_path / "mine.npz", without="g2"), "maze")
     assert code == 0
     data = maze_demonstrations()
-    assert f"40 episodes, {len(data)} transitions" in said
+    assert f"40 demonstrations of skills; {len(data)} transitions in all" in said
     lengths = np.diff(data.episode_ends, prepend=0)[:10]
     words = [line.split() for line in said.splitlines()]
     spread = [f"{each:.0f}" for each in (lengths.min(), np.median(lengths), lengths.max())]
