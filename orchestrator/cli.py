@@ -70,7 +70,7 @@ def _dispatch(words: list[str]) -> None:
 
 
 def _usage() -> str:
-    lines = [f"  {name:<9}{summary}" for name, (_, summary) in COMMANDS.items()]
+    lines = [f"  {name:<12}{summary}" for name, (_, summary) in COMMANDS.items()]
     return "\n".join(
         [
             "usage: skillstitch COMMAND ...",
@@ -103,6 +103,24 @@ def _sweep(words: list[str], output: Console, errors: Console) -> None:
     from sweeps.command import sweep
 
     sweep(words, output, errors)
+
+
+def _check_data(words: list[str], output: Console, errors: Console) -> None:
+    tyro.cli(int, args=["0"])  # as in `_plan`
+    import_lazily("torch")
+    from orchestrator.benchmarks.check_data import check_data_lines
+
+    def check_data(data: tyro.conf.Positional[str], benchmark: str) -> None:
+        """Whether a run could learn from your own data, and what they hold. Runs nothing.
+
+        Args:
+            data: an .npz file, or the id of a Minari dataset: docs/own-data.md.
+            benchmark: what they are data of: maze, kitchen, robosuite-door, robosuite-can.
+        """
+        for line in check_data_lines(data, benchmark):
+            output.print(line, markup=False)
+
+    tyro.cli(check_data, args=words, prog="skillstitch check-data")
 
 
 def _doctor(words: list[str], output: Console, errors: Console) -> None:
@@ -161,6 +179,7 @@ COMMANDS: dict[str, tuple[Command, str]] = {
     "enjoy": (run_commands.enjoy, "an episode of a run, played again, as a film"),
     "export": (run_commands.export, "a run's models and data, for use without its store"),
     "compare": (run_commands.compare, "two runs side by side, paired"),
+    "check-data": (_check_data, "whether your own data can be learned from, and what they hold"),
     "doctor": (_doctor, "check this machine and the installation"),
     "gc": (_gc, "delete artifacts and blocks that no run directory needs"),
 }

@@ -75,7 +75,10 @@ def forecast_lines(plan: Plan, store: Store) -> Iterator[str]:
 
 
 def data_lines(plan: Plan, store: Store) -> Iterator[str]:
-    """What the datasets leave out, where the store has them all."""
+    """What the datasets leave out, where the store has them all or people's own are read.
+
+    Raises BadDataError where these cannot be used.
+    """
     if note := undemonstrated_note(undemonstrated_skills(plan, store)):
         yield note
 
@@ -104,6 +107,7 @@ def suite_plan_lines(suite: Suite, store_root: Path, workers: int | None) -> Ite
     yield f"{suite.name} at {suite.scale} scale: {suite.title}"
     for part in suite.parts:
         plan = make_plan(part.spec)
+        left_out = list(data_lines(plan, store))
         new = {key: recipe for key, recipe in plan.recipes.items() if key not in counted}
         again = len(plan.recipes) - len(new)
         counted |= set(new)
@@ -111,6 +115,7 @@ def suite_plan_lines(suite: Suite, store_root: Path, workers: int | None) -> Ite
         yield ""
         yield f"part {part.label}" + (f", with {again} artifacts of parts above" if again else "")
         yield from plan_lines(part.spec, costs[-1], workers)
+        yield from left_out
     yield ""
     yield (
         f"all {len(costs)} parts: {sum(each.episodes for each in costs):,} episodes, "

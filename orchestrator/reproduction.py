@@ -26,7 +26,7 @@ from orchestrator.spec.spec import Spec
 from orchestrator.spec.structure import Plain
 from orchestrator.storage import locking
 from orchestrator.storage.claim import claim_for_spec
-from orchestrator.storage.datasets import undemonstrated_skills
+from orchestrator.storage.datasets import check_own_data, undemonstrated_skills
 from orchestrator.storage.exports import write_readable
 from orchestrator.storage.ledger import Ledger
 from orchestrator.storage.provenance import provenance
@@ -107,6 +107,7 @@ def reproduce(spec: Spec, settings: Settings, progress: Progress) -> RunDirector
     to be given up (everything else is then finished and reported as partial).
     """
     directory, watch = RunDirectory(settings.out), Stopwatch()
+    check_own_data(make_plan(spec), Store(settings.store))
     with directory.locked(), locking.shared(settings.store, progress.say):
         run_id = claim_for_spec(directory, spec)
         directory.uses(settings.store)

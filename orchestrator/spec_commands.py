@@ -103,10 +103,11 @@ def plan(words: list[str], output: Console) -> None:
         lines = suite_plan_lines(asked, command.store, command.workers)
     else:
         made, store = make_plan(asked), Store(command.store)
+        left_out = list(data_lines(made, store))  # first: there may be data that cannot be used
         costs = estimate(made, store, Ledger.look(command.store / "blocks.sqlite"))
         lines = chain(
             plan_lines(asked, costs, command.workers),
-            data_lines(made, store),
+            left_out,
             forecast_lines(made, store),
         )
     for line in lines:

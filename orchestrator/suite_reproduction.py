@@ -14,9 +14,10 @@ from orchestrator.spec.spec import Spec
 from orchestrator.spec.suite import Suite, suite_differences, suite_of
 from orchestrator.storage import locking
 from orchestrator.storage.claim import claim
+from orchestrator.storage.datasets import check_own_data
 from orchestrator.storage.merge import describe_suite, write_merged
 from orchestrator.storage.rundir import RunDirectory
-from orchestrator.storage.store import storage_errors
+from orchestrator.storage.store import Store, storage_errors
 from orchestrator.work.plan import make_plan
 from orchestrator.work.progress import Progress
 from orchestrator.work.stopwatch import Stopwatch
@@ -36,11 +37,14 @@ def reproduce_suite(suite: Suite, settings: Settings, progress: Progress) -> Run
     (all else is then finished, and the tables are marked as partial).
     """
     directory, watch = RunDirectory(settings.out), Stopwatch()
+    plans = [make_plan(part.spec) for part in suite.parts]
+    for plan in plans:
+        check_own_data(plan, Store(settings.store))
     with directory.locked(), locking.shared(settings.store, progress.say):
         run_id = claim(
             directory,
             describe_suite(suite),
-            [make_plan(part.spec) for part in suite.parts],
+            plans,
             lambda: suite_differences(suite_of(directory), suite),
         )
         directory.uses(settings.store)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from orchestrator.benchmarks.entry import BenchmarkEntry, Costs, Dataset, Illustration
+from orchestrator.benchmarks.own_data import own_dataset, own_label
 from orchestrator.builders.maze import MAZE_BUILDERS
 from orchestrator.builders.studies import maze_showcase_builder
 from stitching.data.maze import MazeDataConfig
@@ -11,6 +12,8 @@ from stitching.studies.showcase.maze import PathRecorder
 
 
 def _datasets(config: MazeDataConfig) -> dict[str, Dataset]:
+    if config.file:
+        return own_dataset("maze-own-data", config.file)
     return {
         "demonstrations": Dataset("maze-demonstrations"),
         "exploration": Dataset("maze-exploration", for_training=False),
@@ -37,4 +40,5 @@ MAZE_ENTRY = BenchmarkEntry(
         )
     },
     recorder=lambda agent: PathRecorder(MAZE),
+    label=own_label,
 )

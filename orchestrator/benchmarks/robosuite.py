@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from orchestrator.benchmarks.entry import BenchmarkEntry, Costs, Dataset, physics_illustrations
+from orchestrator.benchmarks.own_data import own_dataset, own_label
 from orchestrator.builders.robosuite import ROBOSUITE_BUILDERS
 from orchestrator.builders.studies import Studies
 from stitching.data.robosuite.demonstrations import RobosuiteDataConfig
@@ -17,11 +18,17 @@ from stitching.studies.showcase.physics import StepRecorder
 STUDIES = Studies("robosuite", {DOOR.name: DOOR, CAN.name: CAN}, GROUPS)
 
 
+def _datasets(config: RobosuiteDataConfig) -> dict[str, Dataset]:
+    if config.file:
+        return own_dataset("robosuite-own-data", config.file)
+    return {"demonstrations": Dataset("robosuite-demonstrations")}
+
+
 def _entry(benchmark: Benchmark, *task: str) -> BenchmarkEntry:
     return BenchmarkEntry(
         benchmark,
         RobosuiteDataConfig,
-        lambda config: {"demonstrations": Dataset("robosuite-demonstrations")},
+        _datasets,
         ROBOSUITE_BUILDERS | STUDIES.builders,
         Costs(
             update={"agent": 0.03, "mf-policy": 0.01, "dynamics": 0.01},
@@ -40,6 +47,7 @@ def _entry(benchmark: Benchmark, *task: str) -> BenchmarkEntry:
         for_extras=("held_out",),
         illustrations=physics_illustrations("robosuite", task, pairs=1, episodes=30),
         recorder=partial(StepRecorder, benchmark),
+        label=own_label,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from orchestrator.builders.own_data import own_data_builder
 from orchestrator.builders.parts import Builder, Inputs, as_artifact
 from orchestrator.spec.structure import Plain, structure
 from orchestrator.storage.store import Artifact
@@ -24,4 +25,5 @@ SETUP = ("orchestrator.builders.maze", "orchestrator.builders.parts")
 MAZE_BUILDERS = {
     "maze-demonstrations": Builder(_demonstrations, ("stitching.data.maze",), SETUP),
     "maze-exploration": Builder(_exploration, ("stitching.data.maze",), SETUP),
+    "maze-own-data": own_data_builder({MAZE.name: MAZE}, ("stitching.envs.maze",)),
 }

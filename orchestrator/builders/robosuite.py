@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from orchestrator.builders.own_data import own_data_builder
 from orchestrator.builders.parts import Builder, Inputs, as_artifact
 from orchestrator.spec.structure import Plain, structure
 from orchestrator.storage.store import Artifact
@@ -30,4 +31,7 @@ SETUP = ("orchestrator.builders.robosuite", "orchestrator.builders.parts")
 ROBOSUITE_BUILDERS = {
     "robosuite-demonstrations": Builder(_demonstrations, DATA, SETUP),
     "robosuite-held-out": Builder(_held_out, DATA, SETUP),
+    "robosuite-own-data": own_data_builder(
+        SCENES, ("stitching.envs.robosuite.can", "stitching.envs.robosuite.door")
+    ),
 }

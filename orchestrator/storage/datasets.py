@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from analysis.studies.data import left_out
+from orchestrator.builders.registry import BUILDERS
+from orchestrator.errors import BadDataError
 from orchestrator.spec.structure import Plain
 from orchestrator.storage.store import Artifact, Store
 from orchestrator.work.plan import Plan
+from orchestrator.work.recipes import Recipe
+from stitching.data.transitions import DataError
 
 
 def datasets(plan: Plan, store: Store) -> list[Plain]:
@@ -30,11 +34,35 @@ def demonstrated(plan: Plan, dataset: Artifact) -> dict[str, int]:
 def undemonstrated_skills(plan: Plan, store: Store) -> list[str]:
     """Skills of the plan's tasks that no data accomplishes of what its models are learned from.
 
-    None while some of these are not in the store.
+    None while some of these are not in the store; people's own data are read where they lie. Raises
+    BadDataError where these cannot be used.
     """
-    needed = [(plan.recipes[key].kind, key) for key in plan.datasets.values() if key in plan.needed]
-    if not all(each in store for each in needed):
-        return []
-    datasets = [store.read(*each) for each in needed]
-    shown = {skill for dataset in datasets for skill in demonstrated(plan, dataset)}
+    shown: set[str] = set()
+    for key in plan.datasets.values():
+        if key not in plan.needed:
+            continue
+        recipe = plan.recipes[key]
+        if (recipe.kind, key) in store:
+            dataset = store.read(recipe.kind, key)
+        elif BUILDERS[recipe.kind].by_driver:
+            dataset = own_data(recipe)
+        else:
+            return []
+        shown |= demonstrated(plan, dataset).keys()
     return left_out(plan.spec.skill_names, plan.spec.all_tasks, shown)
+
+
+def own_data(recipe: Recipe) -> Artifact:
+    """People's own data, checked as a run does. Raises BadDataError saying what does not fit."""
+    try:
+        return BUILDERS[recipe.kind].make(recipe.params, {})
+    except DataError as error:
+        raise BadDataError(str(error)) from error
+
+
+def check_own_data(plan: Plan, store: Store) -> None:
+    """Raise BadDataError where people's own data, still to be read, cannot be used."""
+    for key in plan.datasets.values():
+        recipe = plan.recipes[key]
+        if BUILDERS[recipe.kind].by_driver and (recipe.kind, key) not in store:
+            own_data(recipe)

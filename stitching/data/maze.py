@@ -20,6 +20,7 @@ class MazeDataConfig(Bounded):
     noise: Share = 0.02  # probability of a random move in them
     exploration_episodes: Amount = 200  # random walks from random cells, for the dynamics
     exploration_steps: Count = 20
+    file: str = ""  # own data in place of these: an .npz file or the id of a Minari dataset
 
 
 def skill_demonstrations(maze: Maze, config: MazeDataConfig, seed: int) -> Transitions:

@@ -49,7 +49,7 @@ class KitchenDataConfig(Bounded):
     """Kitchen's demonstrations: which there are, how many, and how good the demonstrator is."""
 
     source: Source = "orders"  # several skills in human orders, each alone, or people's recordings
-    human: str = ""  # for people's: a Minari id such as D4RL/kitchen/complete-v2, or an .npz file
+    human: str = ""  # for people's: `file` by an older name
     episodes: Episodes = 24  # demonstrations an order
     # First skill of an order → times as many demonstrations of it.
     first_weights: dict[str, NotNegative] = field(default_factory=dict)
@@ -61,6 +61,7 @@ class KitchenDataConfig(Bounded):
     skill_steps: Count = 160  # after which a skill counts as missed and the demonstration ends
     return_home: bool = False  # to the start posture before another skill; people do not
     keep_failures: bool = False  # keep the segment of a missed skill, as one without success
+    file: str = ""  # own data in place of these: an .npz file or the id of a Minari dataset
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -68,6 +69,18 @@ class KitchenDataConfig(Bounded):
             if unknown := sorted(getattr(self, name).keys() - set(SKILLS)):
                 known = ", ".join(SKILLS)
                 raise ValueError(f"{name}: no skill {unknown[0]!r}; there are {known}")
+        if self.file and self.source == "human":
+            raise ValueError("file: names the data, and so does human; leave source as it was")
+
+    @property
+    def are_own(self) -> bool:
+        """Whether all is learned from people's own data, and nothing from scripted ones."""
+        return bool(self.file) or self.source == "human"
+
+    @property
+    def own(self) -> str:
+        """An .npz file or the id of a Minari dataset, where they are; "" where none is named."""
+        return self.file or self.human
 
     def demonstrations(self, order: Order) -> int:
         """How many demonstrations of an order a dataset holds."""

@@ -30,6 +30,7 @@ class RobosuiteDataConfig(Bounded):
     held_out: Amount = 50  # more of each skill, to judge models by
     skill_steps: Count = 40  # actions after which a skill counts as missed
     keep_failures: bool = True  # what a poor demonstrator misses is data, too
+    file: str = ""  # own data in place of these: an .npz file or the id of a Minari dataset
 
 
 @dataclass(frozen=True)

@@ -1,24 +1,18 @@
 """What benchmarks bring along: datasets by source, and labels of unusual data."""
 
 from dataclasses import replace
-from pathlib import Path
 
-import numpy as np
 import pytest
 
 from orchestrator.benchmarks.registry import ENTRIES
 from orchestrator.builders.registry import BUILDERS
-from orchestrator.errors import BadDataError, UsageError
 from orchestrator.spec.spec import Spec, load_spec
 from orchestrator.storage.claim import describe
-from orchestrator.work.building import Builds
 from orchestrator.work.plan import Plan, make_plan
-from orchestrator.work.progress import Silent
 from stitching.data.kitchen.demonstrations import KitchenDataConfig
 from stitching.envs.kitchen import SKILLS
 from stitching.methods.mb_stitch import MBStitchSettings
 from stitching.planning.cem import CEM
-from tests.orchestrator.tiny import Counted, Place
 from tests.sections import section
 
 
@@ -109,57 +103,3 @@ def test_other_sources_are_other_data_and_say_so(spec: Spec) -> None:
     titles = [table["title"] for table in describe(single)["tables"]]
     assert all(title.endswith("(data: each skill alone, from the start pose)") for title in titles)
     assert not any("data:" in table["title"] for table in describe(spec)["tables"])
-
-
-def test_people_s_data_are_named_by_their_content(spec: Spec, tmp_path: Path) -> None:
-    def dataset(content: int) -> str:
-        file = tmp_path / "mine.npz"
-        np.savez(file, observations=np.full((3, 59), content))
-        config = KitchenDataConfig(source="human", human=str(file))
-        return make_plan(replace(spec, data=config)).datasets["demonstrations"]
-
-    assert dataset(1) == dataset(1) != dataset(2)
-
-
-def test_a_minari_dataset_is_named_by_its_content(
-    spec: Spec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
-    folder = tmp_path / "kitchen" / "mine-v0" / "data"
-    folder.mkdir(parents=True)
-
-    def dataset(content: str) -> str:
-        (folder / "main_data.hdf5").write_text(content)
-        config = KitchenDataConfig(source="human", human="kitchen/mine-v0")
-        return make_plan(replace(spec, data=config)).datasets["demonstrations"]
-
-    assert dataset("one") == dataset("one") != dataset("other")
-
-
-def test_people_s_data_are_read_by_the_driver(spec: Spec, tmp_path: Path) -> None:
-    """Workers may be on machines that do not have the file."""
-    place = Place(tmp_path)
-    file = tmp_path / "mine.npz"
-    observations = np.zeros((4, 59), dtype=np.float32)
-    np.savez(file, observations=observations, actions=np.zeros((3, 9)), episode_ends=np.array([4]))
-    config = KitchenDataConfig(source="human", human=str(file))
-    plan = make_plan(replace(spec, data=config))
-    executor = Counted()
-    builds = Builds(plan, place.store, place.directory.ledger(), executor, Silent())
-    with pytest.raises(BadDataError, match=r"mine\.npz: episode_ends, row 0: 4, with 3 actions"):
-        builds.run(plan.needed, set())
-    assert not executor.built
-
-
-@pytest.mark.parametrize(
-    ("human", "complaint"),
-    [
-        ("", "name an .npz file or a Minari dataset"),
-        ("gone.npz", "no file gone.npz"),
-        ("kitchen/gone-v0", "no Minari dataset at .*minari download kitchen/gone-v0"),
-    ],
-)
-def test_people_s_data_must_be_named(spec: Spec, human: str, complaint: str) -> None:
-    config = KitchenDataConfig(source="human", human=human)
-    with pytest.raises(UsageError, match=complaint):
-        make_plan(replace(spec, data=config))
