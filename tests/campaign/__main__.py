@@ -21,7 +21,6 @@ from orchestrator.work.worker import use_one_thread
 from tests.campaign.faults import FAULTS
 from tests.campaign.ground import Fault, Ground, NotTriedError
 
-
 MOST_FAILURES = 5  # of a fault: the others would tell no more
 
 
