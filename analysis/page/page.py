@@ -10,8 +10,12 @@ from typing import Any
 import pandas as pd
 
 from analysis.figures.drawn import Drawn
+from analysis.page.distribution import distribution_html
+from analysis.page.origin import TITLE as AGAIN
+from analysis.page.origin import origin_section
 from analysis.page.profile import TITLE as PROFILE_TITLE
 from analysis.page.profile import profile_section
+from analysis.page.sources import links_html, source_html
 from analysis.page.studies import (
     forecast_section,
     models_section,
@@ -31,6 +35,18 @@ OF_PAIRS = ("forecast",)
 OF_MODELS = ("diagnosis", "diagnosis-values")
 OF_STITCHES = ("stitch-outcomes",)
 """Figures that stand beside what they are about, and not with those of the whole run."""
+
+FILES = {
+    "profile": {"profile": "first and second skills"},
+    "rates": {"rates": "rates of every skill"},
+    "pairs": {"pairs": "every pair", "pair-groups": "groups of pairs"},
+    "forecast": {"forecast": "every pair"},
+    "models": {"models": "every model"},
+    "stitches": {"stitch-outcomes": "outcomes", "stitches": "every stitch"},
+    "every-task": {"permutations": "every permutation"},
+}
+"""Section → its CSV files and what they hold."""
+OF_ALL = ("permutations",)  # not of a study
 
 PERMUTATION_COLUMNS: list[dict[str, Any]] = [
     {"title": "Task", "digits": None},
@@ -85,10 +101,15 @@ def render_page(
         ),
         "skills": ("Single skills", _single_skills(run)),
         "every-task": ("Every permutation", _permutation_section(run)),
+        "again": (AGAIN, origin_section(run.spec)),
         "provenance": ("Provenance", _provenance(run.provenance)),
         "reading": ("How to read this", _reading(run, tables)),
     }
-    sections = {name: section for name, section in sections.items() if section[1]}
+    sections = {
+        name: (title, content + _files(name, studies))
+        for name, (title, content) in sections.items()
+        if content
+    }
     template = Template(_asset("report.html"))
     return template.substitute(
         title=escape(run.spec.title),
@@ -107,6 +128,14 @@ def render_page(
         style=_asset("report.css"),
         script=_asset("report.js"),
     )
+
+
+def _files(section: str, studies: dict[str, pd.DataFrame]) -> str:
+    """Links to the CSV files that have a section's numbers, beside what its tables link to."""
+    there = {*studies, *OF_ALL}
+    held = {file: what for file, what in FILES.get(section, {}).items() if file in there}
+    links = links_html((f"{file}.csv", what) for file, what in held.items())
+    return f'<p class="note">{links}</p>' if held else ""
 
 
 def _asset(name: str) -> str:
@@ -160,8 +189,10 @@ def _table_section(table: Table, drawn: list[Drawn], figures: Path) -> str:
         [
             f'<p class="notice">{escape(notes.pop(0))}</p>' if table.missing else "",
             scores_html(table),
+            source_html(table),
             *(f'<p class="note">{escape(note)}</p>' for note in notes if note),
             *(_figure(figure, figures) for figure in drawn if figure.table == table.entry.id),
+            distribution_html(table),
             claims_html(table),
             gains_html(table),
         ]

@@ -26,6 +26,7 @@ def test_draws_what_there_is_data_for(run: Run, tmp_path: Path) -> None:
     drawn = draw_figures(replace(run, training=[]), [table], tmp_path)
     assert [(figure.name, figure.table) for figure in drawn] == [
         ("table1-scores", "table1"),
+        ("table1-distribution", "table1"),
         ("showcase", ""),
         ("pairs", ""),
     ]
