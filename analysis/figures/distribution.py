@@ -26,7 +26,7 @@ def draw_distributions(table: Table) -> Figure:
                 THRESHOLDS, of.share_low, of.share_high, step="post", color=colour, alpha=0.2, lw=0
             )
         axes.set_title(row)
-        axes.set(xlim=(0, 1), ylim=(0, 1.02))
+        axes.set(xlim=(0, 1), ylim=(0, 1.02), xticks=[0, 0.5, 1])
         axes.grid(color=FAINT, lw=0.4)
         axes.set_axisbelow(True)
     for axes in grid[len(rows) :]:

@@ -45,7 +45,7 @@ def origin_section(spec: RunSpec) -> str:
     said, command, changes = _told(spec)
     html = f'<p class="note">{escape(said)}</p>'
     if command:
-        html += f'<pre class="scroll" tabindex="0"><code>{escape(command)}</code></pre>'
+        html += f"<pre><code>{escape(command)}</code></pre>"
     origin = spec.origin
     if changes:
         html += f'<p class="note">{escape(changes)}</p>'

@@ -1,6 +1,6 @@
 """What a table stands beside in the paper, and the files that have its numbers."""
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from html import escape
 
 import pandas as pd
@@ -9,6 +9,18 @@ from analysis.paper.numbers import PAPER
 from analysis.schema import TableEntry
 from analysis.studies.distribution import distribution_table
 from analysis.tables.table import Table
+
+FILES = {
+    "profile": {"profile": "first and second skills"},
+    "rates": {"rates": "rates of every skill"},
+    "pairs": {"pairs": "every pair", "pair-groups": "groups of pairs"},
+    "forecast": {"forecast": "every pair"},
+    "models": {"models": "every model"},
+    "stitches": {"stitch-outcomes": "outcomes", "stitches": "every stitch"},
+    "every-task": {"permutations": "every permutation"},
+}
+"""Section of the page → its CSV files and what they hold."""
+OF_ALL = ("permutations",)  # not of a study
 
 HEADING = "## Where it is from"
 
@@ -65,3 +77,13 @@ def links_html(files: Iterable[tuple[str, str]]) -> str:
     """Links to files (name, what it holds) beside the page."""
     links = ", ".join(f'<a href="{escape(name)}">{escape(what)}</a>' for name, what in files)
     return f"Files beside this page: {links}."
+
+
+def section_links(section: str, studies: Container[str]) -> str:
+    """A paragraph for a section whose numbers are in files of their own; else nothing."""
+    files = [
+        (f"{file}.csv", what)
+        for file, what in FILES.get(section, {}).items()
+        if file in OF_ALL or file in studies
+    ]
+    return f'<p class="note">{links_html(files)}</p>' if files else ""
