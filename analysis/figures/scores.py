@@ -35,14 +35,15 @@ def draw_scores(
 
     for cell in scores.to_dict("records"):
         y, (colour, marker) = at(cell), look_of[cell["method"]]
-        look: dict[str, Any] = {"color": colour, "marker": marker, "ls": "none"}
+        look: dict[str, Any] = {"color": colour, "marker": marker, "ls": "none", "clip_on": False}
         axes.plot([cell["ci_low"], cell["ci_high"]], [y, y], color=colour, lw=1.6)
         axes.plot(cell["score"], y, ms=5, **look)
         axes.plot(cell["paper_score"], y, ms=7.5, mfc="none", mew=1.1, **look)
     of_seeds = seed_scores.to_dict("records") if seed_scores is not None else []
     several = len({cell["seed"] for cell in of_seeds}) > 1
     for cell in of_seeds if several else []:
-        axes.plot(cell["score"], at(cell) + BELOW, color=look_of[cell["method"]][0], **SEED)
+        colour, _ = look_of[cell["method"]]
+        axes.plot(cell["score"], at(cell) + BELOW, color=colour, clip_on=False, **SEED)
     for row in range(1, len(rows)):
         axes.axhline(row * height - (1 + ROW_GAP) / 2, color=FAINT, lw=0.7)
     middle = (len(methods) - 1) / 2
@@ -58,12 +59,13 @@ def draw_scores(
         for method, (colour, marker) in look_of.items()
     ]
     if several:
-        keys.append(Line2D([], [], color=INK, label="each seed", **SEED))
+        keys.append(Line2D([], [], color=INK, label="seeds", **SEED))
     if scores["paper_score"].notna().any():
         hollow: dict[str, Any] = {"marker": "o", "mfc": "none", "ms": 7.5, "ls": "none"}
         keys.append(Line2D([], [], color=INK, label="paper (hollow)", **hollow))
     letters = np.mean([len(str(key.get_label())) for key in keys])
-    columns = int(WIDTH / (0.5 + 0.075 * letters))  # inches of a key's line and of a letter
+    # Inches: of a key's line and the space after it, of a letter; no space after the last.
+    columns = int((WIDTH + 0.15) / (0.5 + 0.075 * letters))
     figure.legend(handles=keys, loc="outside upper left", ncols=columns, columnspacing=1.2)
     return figure
 

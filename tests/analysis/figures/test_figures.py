@@ -48,10 +48,10 @@ def test_every_seed_has_a_dot_where_there_are_several(run: Run) -> None:
     drawn = sorted(float(line.get_xdata()[0]) for line in dots)  # type: ignore[index, arg-type]
     assert drawn == pytest.approx(sorted(table.seed_scores["score"]))
     assert len(drawn) == 3 * 3 * 4  # seeds, rows, methods
-    assert "each seed" in legend_of(figure)
+    assert "seeds" in legend_of(figure)
     alone = table.seed_scores.query("seed == 0")
-    assert "each seed" not in legend_of(draw_scores(table.scores, table.labels, alone))
-    assert "each seed" not in legend_of(draw_scores(table.scores, table.labels))
+    assert "seeds" not in legend_of(draw_scores(table.scores, table.labels, alone))
+    assert "seeds" not in legend_of(draw_scores(table.scores, table.labels))
 
 
 def legend_of(figure: Figure) -> list[str]:
