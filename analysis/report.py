@@ -25,7 +25,7 @@ from analysis.studies.models import model_table
 from analysis.studies.pairs import both_skills, pair_groups, pair_table, second_skills, shown_orders
 from analysis.studies.rates import HEADER, NOTE, rate_lines, rate_table
 from analysis.studies.stitches import outcome_table, stitch_table
-from analysis.tables.skills import permutation_scores
+from analysis.tables.skills import permutation_scores, single_skill_rates
 from analysis.tables.table import Table, build_table
 from analysis.tables.writers import markdown_table, to_csv, to_latex, to_markdown
 
@@ -106,6 +106,8 @@ def _build(run_dir: Path) -> tuple[list[Table], Studies, list[Drawn]]:
             for kind, lines in csv_tables(table).items():
                 _write(report / file_name(name, kind), to_csv(lines))
         _write(report / "permutations.csv", to_csv(permutation_scores(episodes, run.spec)))
+        singles = single_skill_rates(run.segments, run.spec)
+        _write(report / "single-skills.csv", to_csv(singles))
         for name, study in studies.items():
             _write(report / f"{name}.csv", to_csv(study))
         if "profile" in studies:

@@ -17,10 +17,11 @@ FILES = {
     "forecast": {"forecast": "every pair"},
     "models": {"models": "every model"},
     "stitches": {"stitch-outcomes": "outcomes", "stitches": "every stitch"},
+    "skills": {"single-skills": "every skill"},
     "every-task": {"permutations": "every permutation"},
 }
 """Section of the page → its CSV files and what they hold."""
-OF_ALL = ("permutations",)  # not of a study
+OF_ALL = ("permutations", "single-skills")  # not of a study
 
 HEADING = "## Where it is from"
 

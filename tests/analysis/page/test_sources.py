@@ -58,7 +58,7 @@ def test_sections_of_the_page_link_to_theirs(
 ) -> None:
     page = build_report(write_kitchen(write_run, tmp_path / "run", showcase=None))
     found = links(page.read_text())
-    assert {"pairs.csv", "pair-groups.csv", "permutations.csv"} <= found
+    assert {"pairs.csv", "pair-groups.csv", "permutations.csv", "single-skills.csv"} <= found
     assert all((page.parent / name).is_file() for name in found)
 
 
