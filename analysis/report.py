@@ -10,8 +10,11 @@ from analysis.episodes import write_episodes
 from analysis.figures import draw_figures
 from analysis.figures.drawn import Drawn
 from analysis.files import replaced_folder
+from analysis.page.distribution import distribution_markdown
+from analysis.page.origin import origin_markdown
 from analysis.page.page import render_page
 from analysis.page.profile import profile_markdown
+from analysis.page.sources import CSVS, csv_tables, file_name, source_markdown
 from analysis.paper.profile import profiles
 from analysis.results import check_results, provenance_text
 from analysis.run import Run, load_run
@@ -22,7 +25,7 @@ from analysis.studies.models import model_table
 from analysis.studies.pairs import both_skills, pair_groups, pair_table, second_skills, shown_orders
 from analysis.studies.rates import HEADER, NOTE, rate_lines, rate_table
 from analysis.studies.stitches import outcome_table, stitch_table
-from analysis.tables.skills import permutation_scores
+from analysis.tables.skills import permutation_scores, single_skill_rates
 from analysis.tables.table import Table, build_table
 from analysis.tables.writers import markdown_table, to_csv, to_latex, to_markdown
 
@@ -57,6 +60,7 @@ def export_results(run_dir: Path, results_dir: Path, *, force: bool = False) -> 
         folder = results_dir / name
         with replaced_folder(folder) as draft:
             _copy_table(name, report, studies, drawn, draft)
+            _write(draft / "table.md", _markdown(run, table, studies, kept=True))
             _write(draft / PROVENANCE, provenance_text(run.provenance, run.spec.extent))
             for file in (SPEC, QUARANTINE):
                 if (run_dir / file).is_file():
@@ -71,18 +75,16 @@ def _copy_table(
     name: str, report: Path, studies: Iterable[str], drawn: list[Drawn], folder: Path
 ) -> None:
     for source, target in {
-        f"{name}.csv": "scores.csv",
-        f"{name}-gains.csv": "gains.csv",
-        f"{name}.md": "table.md",
+        **{file_name(name, kind): file_name(name, kind, kept=True) for kind in CSVS},
         f"{name}.tex": "table.tex",
         **{
             file.name: file.name
             for study in studies
             for file in (report / f"{study}.csv", report / f"{study}.md")
-            if file.is_file()
         },
     }.items():
-        shutil.copyfile(report / source, folder / target)
+        if (report / source).is_file():
+            shutil.copyfile(report / source, folder / target)
     (folder / "figures").mkdir()
     for figure in drawn:
         if figure.table in ("", name):
@@ -95,17 +97,17 @@ def _build(run_dir: Path) -> tuple[list[Table], Studies, list[Drawn]]:
     episodes = write_episodes(run_dir)
     tables = [build_table(episodes, run.spec, entry) for entry in run.spec.tables]
     studies = _studies(run)
-    left_out = undemonstrated_note(undemonstrated(run))
-    beside = (f"\n**{left_out}**\n" if left_out else "") + _markdown_rates(studies)
     with replaced_folder(run_dir / "report") as report:
         drawn = draw_figures(run, tables, report / "figures", studies.get("forecast"))
         for table in tables:
             name = table.entry.id
-            _write(report / f"{name}.md", to_markdown(table) + beside)
+            _write(report / f"{name}.md", _markdown(run, table, studies))
             _write(report / f"{name}.tex", to_latex(table))
-            _write(report / f"{name}.csv", to_csv(table.scores))
-            _write(report / f"{name}-gains.csv", to_csv(table.gains))
+            for kind, lines in csv_tables(table).items():
+                _write(report / file_name(name, kind), to_csv(lines))
         _write(report / "permutations.csv", to_csv(permutation_scores(episodes, run.spec)))
+        singles = single_skill_rates(run.segments, run.spec)
+        _write(report / "single-skills.csv", to_csv(singles))
         for name, study in studies.items():
             _write(report / f"{name}.csv", to_csv(study))
         if "profile" in studies:
@@ -139,11 +141,17 @@ def _studies(run: Run) -> Studies:
     return studies
 
 
-def _markdown_rates(studies: Studies) -> str:
-    if "rates" not in studies:
-        return ""
-    lines = markdown_table(HEADER, rate_lines(studies["rates"]))
-    return f"\n## What there is to stitch\n\n{lines}\n\n{NOTE}\n"
+def _markdown(run: Run, table: Table, studies: Studies, *, kept: bool = False) -> str:
+    """The table, and what is told beside it; `kept`: in a folder of its own, beside its CSVs."""
+    parts = [to_markdown(table)]
+    left_out = undemonstrated_note(undemonstrated(run))
+    if left_out:
+        parts.append(f"**{left_out}**\n")
+    if "rates" in studies:
+        lines = markdown_table(HEADER, rate_lines(studies["rates"]))
+        parts.append(f"## What there is to stitch\n\n{lines}\n\n{NOTE}\n")
+    parts += [distribution_markdown(table), source_markdown(table, kept=kept)]
+    return "\n".join(filter(None, [*parts, origin_markdown(run.spec)]))
 
 
 def _write(path: Path, text: str) -> None:

@@ -75,6 +75,16 @@ class PartEntry:
 
 
 @dataclass(frozen=True)
+class Origin:
+    """How what was asked stands to the packaged file and to the defaults."""
+
+    packaged: str = ""  # the packaged file that has this name and scale; "" if none has
+    command: tuple[str, ...] = ()  # asks for the same again; () where no options do
+    changed: tuple[tuple[str, Any, Any], ...] = ()  # field, here, in the packaged file
+    defaults: tuple[tuple[str, Any, Any], ...] = ()  # field, here, its default
+
+
+@dataclass(frozen=True)
 class RunSpec:
     """What was asked of a run: the part of `spec.json` that its tables depend on."""
 
@@ -96,6 +106,7 @@ class RunSpec:
     models: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # kinds, by method
     long_task: str = ""  # what Single-Policy learned, uncut; "" of a merged run
     settings: Mapping[str, object] = field(default_factory=dict)  # all that was asked, by path
+    origin: Origin | None = None  # None: an earlier version asked
 
     @classmethod
     def from_dict(cls, spec: Mapping[str, Any]) -> RunSpec:
@@ -121,6 +132,7 @@ class RunSpec:
                 block_episodes=spec.get("spec", {}).get("block_episodes", 1),
                 long_task=spec.get("spec", {}).get("single_policy", {}).get("task", ""),
                 settings=_settings(spec.get("spec", {})),
+                origin=_origin(spec["origin"]) if "origin" in spec else None,
                 parts=tuple(
                     PartEntry(
                         part["label"],
@@ -194,6 +206,14 @@ def _settings(asked: Mapping[str, Any]) -> dict[str, Any]:
         if name in asked
     }
     return leaves({**asked, **named}, ".")
+
+
+def _origin(plain: Mapping[str, Any]) -> Origin:
+    return Origin(
+        plain["packaged"],
+        tuple(plain["command"]),
+        *(tuple((at, a, b) for at, a, b in plain[name]) for name in ("changed", "defaults")),
+    )
 
 
 def _step_limits(plain: Mapping[str, Any]) -> dict[int, int]:

@@ -128,8 +128,11 @@ def suite_plan_lines(suite: Suite, store_root: Path, workers: int | None) -> Ite
 
 def summary_lines(directory: RunDirectory) -> Iterator[str]:
     """A finished run: its tables, where its time went, where to look."""
+    from analysis.page.sources import HEADING
+
     for table in directory.asked()["tables"]:
-        yield (directory.path / "report" / f"{table['id']}.md").read_text().strip()
+        text = (directory.path / "report" / f"{table['id']}.md").read_text()
+        yield text.partition(HEADING)[0].strip()
         yield ""
     seconds = directory.read_json("seconds.json") or {}
     phases = sorted(seconds.items(), key=lambda phase: -phase[1])

@@ -6,6 +6,7 @@ import pandas as pd
 
 from analysis.figures.curves import draw_curves
 from analysis.figures.diagnosis import draw_predictions, draw_value_curves
+from analysis.figures.distribution import draw_distributions
 from analysis.figures.drawn import Drawn
 from analysis.figures.forecast import draw_forecast
 from analysis.figures.pairs import draw_pairs
@@ -31,13 +32,15 @@ def draw_figures(
     with house_style():
         for table in tables:
             name = f"{table.entry.id}-scores"
-            save(draw_scores(table), folder, name)
+            save(draw_scores(table.scores, table.labels, table.seed_scores), folder, name)
+            each = " Small dots: the mean of each seed." if len(run.spec.seeds) > 1 else ""
             caption = (
                 f"{table.entry.title}: our scores (filled, with 95 % intervals) and the paper's "
-                f"(hollow). Scale {run.spec.scale}, {len(run.spec.seeds)} seed(s). "
+                f"(hollow).{each} Scale {run.spec.scale}, {len(run.spec.seeds)} seed(s). "
                 f"{seed_note(table.fewest_seeds)}"
             )
             drawn.append(Drawn(name, caption, table.entry.id))
+            drawn += _distributions(table, folder)
         drawn += draw_showcases(run, folder)
         pair = _first_and_last_method(run)
         if pair:
@@ -71,6 +74,11 @@ FORECAST_CAPTION = (
     "played, one circle a pair, all seeds, the larger the more trials; on the "
     "dashed line both are equal."
 )
+DISTRIBUTION_CAPTION = (
+    "Performance profiles (Agarwal et al., 2021): the share of tasks whose score is above τ, over "
+    "all tasks of a row and all seeds. A line above another at every τ is better."
+)
+BANDS = " Bands are 95 % intervals from resampling seeds."
 PREDICTIONS_CAPTION = (
     "Predictions of the dynamics on held-out demonstrations. Left: root mean square error over "
     "the distance moved; 1 (dashed) is no better than predicting that nothing moves. Right: the "
@@ -93,6 +101,15 @@ OUTCOMES_CAPTION = (
     "predicted; and how much the value members and the dynamics members disagreed about the state "
     "predicted, on average over the stitch: the two variances that Eq. 2 subtracts."
 )
+
+
+def _distributions(table: Table, folder: Path) -> list[Drawn]:
+    if not table.distributions:
+        return []
+    name = f"{table.entry.id}-distribution"
+    save(draw_distributions(table), folder, name)
+    several = any(of.seeds > 1 for of in table.distributions.values())
+    return [Drawn(name, DISTRIBUTION_CAPTION + (BANDS if several else ""), table.entry.id)]
 
 
 def _diagnosis(run: Run, folder: Path) -> list[Drawn]:

@@ -25,7 +25,8 @@ def draw_curves(training: list[dict[str, Any]]) -> Figure:
             points = model["curves"].get(curve, []) if model["kind"] == kind else []
             steps, values = zip(*points, strict=True) if points else ((), ())
             colour = COLOURS[seeds.index(model["seed"]) % len(COLOURS)]
-            axes.plot(steps, values, color=colour, lw=1.1, alpha=0.85)
+            alone = "o" if len(points) == 1 else None  # a line of one point is not seen
+            axes.plot(steps, values, color=colour, lw=1.1, alpha=0.85, marker=alone, ms=3.5)
         axes.set_title(f"{kind}: {curve.replace('_', ' ')}")
         axes.grid(color=FAINT, lw=0.4)
         axes.ticklabel_format(axis="x", style="sci", scilimits=(0, 4))

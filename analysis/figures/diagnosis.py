@@ -30,6 +30,7 @@ def draw_predictions(predictions: Mapping[str, Any]) -> Figure:
         axes.set_xlabel("disagreement of the ensemble")
     panels[1].set_ylabel("error of its mean")
     _same_scale(panels[1:], [study["points"] for study in predictions.values()])
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper left", ncols=9)
     return figure
 
 
@@ -68,7 +69,6 @@ def _draw_errors(axes: Axes, predictions: Mapping[str, Any]) -> None:
     axes.tick_params(axis="y", length=0)
     axes.set_xlabel("error / distance moved")
     axes.set_title("error of predictions")
-    axes.legend(loc="best")
 
 
 def draw_value_curves(values: Mapping[str, Any], spec: RunSpec) -> Figure:

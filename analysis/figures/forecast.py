@@ -5,7 +5,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.figures.pairs import draw_matrix, two_panels
+from analysis.figures.pairs import blank_key, draw_matrix, explain, two_panels
 from analysis.figures.style import INK
 from analysis.schema import RunSpec
 
@@ -21,6 +21,8 @@ def draw_forecast(table: pd.DataFrame, spec: RunSpec) -> Figure:
         [[forecast.get((first, second), np.nan) for second in spec.skills] for first in spec.skills]
     )
     draw_matrix(left, matrix, spec)
+    if np.isnan(matrix).any():
+        explain(figure, [blank_key("no forecast")])
     left.set_ylabel("first skill, accomplished")
     left.set_title("Forecast")
     _calibration(right, table[table["trials"] > 0])

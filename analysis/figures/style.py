@@ -21,6 +21,7 @@ METHODS = (
 """Each has its colour and marker in every figure, by its place here."""
 
 INK, FAINT = "#222222", "#D0D0D0"
+SMALLEST = 7.5  # points; pages keep letters of this size legible
 
 SETTINGS: dict[Any, Any] = {
     "svg.hashsalt": "skillstitch",  # element ids in SVG files are random otherwise

@@ -1,6 +1,5 @@
 """The report as one self-contained HTML page: everything it shows is inside the file."""
 
-import base64
 import json
 from html import escape
 from pathlib import Path
@@ -10,8 +9,13 @@ from typing import Any
 import pandas as pd
 
 from analysis.figures.drawn import Drawn
+from analysis.page.distribution import distribution_html
+from analysis.page.figures import figure_html, named_figures
+from analysis.page.origin import TITLE as AGAIN
+from analysis.page.origin import origin_section
 from analysis.page.profile import TITLE as PROFILE_TITLE
 from analysis.page.profile import profile_section
+from analysis.page.sources import section_links, source_html
 from analysis.page.studies import (
     forecast_section,
     models_section,
@@ -63,7 +67,7 @@ def render_page(
         "figures": (
             "Figures",
             "".join(
-                _figure(figure, figures)
+                figure_html(figure, figures)
                 for figure in drawn
                 if not figure.table and figure.name not in OF_PAIRS + OF_MODELS + OF_STITCHES
             ),
@@ -73,22 +77,27 @@ def render_page(
         "pairs": ("Pairs of skills", pairs_section(run, studies.get("pair-groups"))),
         "forecast": (
             "A forecast of pairs",
-            forecast_section(studies.get("forecast")) + _named(OF_PAIRS, drawn, figures),
+            forecast_section(studies.get("forecast")) + named_figures(OF_PAIRS, drawn, figures),
         ),
         "models": (
             "Are the models right?",
-            models_section(run, studies.get("models")) + _named(OF_MODELS, drawn, figures),
+            models_section(run, studies.get("models")) + named_figures(OF_MODELS, drawn, figures),
         ),
         "stitches": (
             "When does stitching hurt?",
-            stitches_section(run, studies) + _named(OF_STITCHES, drawn, figures),
+            stitches_section(run, studies) + named_figures(OF_STITCHES, drawn, figures),
         ),
         "skills": ("Single skills", _single_skills(run)),
         "every-task": ("Every permutation", _permutation_section(run)),
+        "again": (AGAIN, origin_section(run.spec)),
         "provenance": ("Provenance", _provenance(run.provenance)),
         "reading": ("How to read this", _reading(run, tables)),
     }
-    sections = {name: section for name, section in sections.items() if section[1]}
+    sections = {
+        name: (title, content + section_links(name, studies))
+        for name, (title, content) in sections.items()
+        if content
+    }
     template = Template(_asset("report.html"))
     return template.substitute(
         title=escape(run.spec.title),
@@ -160,29 +169,13 @@ def _table_section(table: Table, drawn: list[Drawn], figures: Path) -> str:
         [
             f'<p class="notice">{escape(notes.pop(0))}</p>' if table.missing else "",
             scores_html(table),
+            source_html(table),
             *(f'<p class="note">{escape(note)}</p>' for note in notes if note),
-            *(_figure(figure, figures) for figure in drawn if figure.table == table.entry.id),
+            *(figure_html(figure, figures) for figure in drawn if figure.table == table.entry.id),
+            distribution_html(table),
             claims_html(table),
             gains_html(table),
         ]
-    )
-
-
-def _named(names: tuple[str, ...], drawn: list[Drawn], folder: Path) -> str:
-    return "".join(_figure(figure, folder) for figure in drawn if figure.name in names)
-
-
-def _figure(figure: Drawn, folder: Path) -> str:
-    if figure.missing:
-        return f'<p class="note">{escape(figure.missing)}</p>'
-    # As an image of its own, an SVG's element ids cannot clash with another's.
-    file = folder / figure.files[0]
-    data = base64.b64encode(file.read_bytes()).decode("ascii")
-    kind = "svg+xml" if file.suffix == ".svg" else "png"
-    caption = escape(figure.caption)
-    return (
-        f'<figure><img src="data:image/{kind};base64,{data}" alt="{caption}">'
-        f"<figcaption>{caption}</figcaption></figure>"
     )
 
 

@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+PAPER = "Offline Model-Based Skill Stitching"
+
 HALF_DIGIT = 0.0005
 """Scores are printed to three decimals: each stands for everything this close to it."""
 

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Container, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pandas as pd
@@ -11,12 +12,14 @@ from analysis.paper.numbers import paper_scores, paper_tasks
 from analysis.paper.orders import Cells, by_order, order_duels
 from analysis.schema import RunSpec, TableEntry
 from analysis.statistics import arrange, estimate, generator, paired_gain
+from analysis.tables.distribution import Distribution, cell_distributions
 from analysis.tables.rows import column_labels, place_tasks
 
 SCORE_COLUMNS = [
     "row", "method", "score", "variance", "std", "ci_low", "ci_high", "episodes", "seeds",
     "paper_score", "paper_error",
 ]  # fmt: skip
+TASK_COLUMNS = ["row", "method", "seed", "task", "score"]
 GAIN_COLUMNS = [
     "row", "method", "baseline", "gain", "ci_low", "ci_high", "relative_gain", "pairs", "seeds",
 ]  # fmt: skip
@@ -29,6 +32,7 @@ class Table:
     spec: RunSpec
     entry: TableEntry
     scores: pd.DataFrame  # SCORE_COLUMNS, one row a cell
+    task_scores: pd.DataFrame  # TASK_COLUMNS: mean scores of tasks, under the models of a seed
     gains: pd.DataFrame  # GAIN_COLUMNS
     leads: pd.DataFrame  # GAIN_COLUMNS: the paper's leader of each row over its best other
     orders: pd.DataFrame  # GAIN_COLUMNS: Table 4's leaders by order of skills, no line elsewhere
@@ -43,6 +47,17 @@ class Table:
     @property
     def methods(self) -> list[str]:
         return list(dict.fromkeys(self.scores["method"]))
+
+    @property
+    def seed_scores(self) -> pd.DataFrame:
+        """A line for each row, method and seed: the means that a score is the mean of."""
+        by_seed = self.task_scores.groupby(["row", "method", "seed"], sort=False)["score"]
+        return by_seed.mean().reset_index()
+
+    @cached_property
+    def distributions(self) -> dict[tuple[str, str], Distribution]:
+        """(row, method) -> how scores differ from task to task, where tasks are many."""
+        return cell_distributions(self.task_scores, self.entry.id)
 
     @property
     def missing(self) -> dict[tuple[str, str], int]:
@@ -74,6 +89,7 @@ def build_table(episodes: pd.DataFrame, spec: RunSpec, entry: TableEntry) -> Tab
         spec=spec,
         entry=entry,
         scores=scores,
+        task_scores=task_table(cells),
         gains=_only(gains, gain_pairs),
         leads=_only(gains, lead_pairs),
         orders=gain_table(orders, order_duels(orders, entry.paper, long_task), entry),
@@ -122,6 +138,18 @@ def score_table(cells: Cells, entry: TableEntry, alone: Container[str] = ()) -> 
              ours.episodes, ours.seeds, *paper.get((row, method), (np.nan, np.nan)))
         )  # fmt: skip
     return pd.DataFrame(records, columns=SCORE_COLUMNS)
+
+
+def task_table(cells: Cells) -> pd.DataFrame:
+    """TASK_COLUMNS, for every task of which a seed has an episode."""
+    parts = [
+        played.groupby(["seed", "task"])["score"]
+        .mean()
+        .reset_index()
+        .assign(row=row, method=method)
+        for (row, method), played in cells.items()
+    ]
+    return pd.concat(parts, ignore_index=True)[TASK_COLUMNS]
 
 
 def gain_table(cells: Cells, pairs: list[tuple[str, str, str]], entry: TableEntry) -> pd.DataFrame:

@@ -9,6 +9,7 @@ from analysis.schema import SEPARATOR, SPEC
 from orchestrator.benchmarks.registry import ENTRIES
 from orchestrator.errors import ChangedError, UsageError
 from orchestrator.spec.methods import first_method, method_label, method_of
+from orchestrator.spec.origin import origin
 from orchestrator.spec.spec import Spec, TableSpec, differences, plain_spec, spec_from_plain
 from orchestrator.spec.structure import Plain, to_plain
 from orchestrator.storage.provenance import matters
@@ -99,6 +100,7 @@ def describe(spec: Spec) -> Plain:
         "step_limits": {str(length): limit for length, limit in spec.step_limits.items()},
         "tables": [to_plain(table) | _title(spec, table) for table in spec.tables],
         "spec": plain_spec(spec),
+        "origin": origin(spec),
     }
 
 

@@ -26,6 +26,7 @@ from analysis.schema import (
 from orchestrator.benchmarks.registry import ENTRIES
 from orchestrator.errors import UsageError
 from orchestrator.spec.methods import first_method, method_label, method_of
+from orchestrator.spec.origin import origin
 from orchestrator.spec.structure import Plain, to_plain
 from orchestrator.spec.suite import Part, Suite, suite_of
 from orchestrator.storage.claim import IDENTITY
@@ -120,6 +121,7 @@ def describe_suite(suite: Suite) -> Plain:
             for part in parts
         ],
         "spec": to_plain(suite),
+        "origin": origin(suite),
     }
 
 

@@ -1,6 +1,8 @@
 """Opens the report in a real headless Chromium, as a reader would."""
 
+import base64
 import os
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -74,7 +76,7 @@ def test_shows_the_table_beside_the_paper(page: Any) -> None:
 
 def test_every_figure_is_drawn(page: Any) -> None:
     figures = page.locator("figure img")
-    assert figures.count() == 4
+    assert figures.count() == 5
     for i in range(figures.count()):
         figures.nth(i).scroll_into_view_if_needed()
         assert figures.nth(i).is_visible()
@@ -113,6 +115,23 @@ def test_more_permutations_are_shown_on_demand(page: Any) -> None:
     page.get_by_role("button", name="Show more").click()
     assert len(column(page, 1)) == 240
     assert page.get_by_role("button", name="Show more").is_hidden()
+
+
+@pytest.mark.parametrize("width", [390, 1200])
+def test_letters_in_figures_can_be_read(page: Any, width: int) -> None:
+    """At least nine pixels high, however wide the screen; what is wider than it scrolls."""
+    page.set_viewport_size({"width": width, "height": 800})
+    figures = page.locator("figure img")
+    for i in range(figures.count()):
+        svg = base64.b64decode(figures.nth(i).get_attribute("src").partition(",")[2]).decode()
+        letters = min(float(scale) for scale in re.findall(r"scale\((0\.\d+) -0\.\d+\)", svg)) * 100
+        drawn = float(re.findall(r'width="([\d.]+)pt"', svg)[0])
+        shown = figures.nth(i).evaluate(
+            "image => image.clientWidth - 2 * parseFloat(getComputedStyle(image).paddingLeft)"
+        )
+        assert letters * shown / drawn >= 8.99, f"figure {i}: {letters} of {drawn} points"
+        box = figures.nth(i).locator("..")
+        assert box.evaluate("box => box.clientWidth") < width
 
 
 def test_nothing_sticks_out_on_a_narrow_screen(page: Any) -> None:

@@ -1,6 +1,7 @@
 """The command line: what each command says and does, and how it exits."""
 
 import json
+import re
 import resource
 import shutil
 import subprocess
@@ -397,7 +398,9 @@ def test_report(cli: Cli, done: Place, expected: dict[str, bytes]) -> None:
     assert answer.code == 0
     assert promised_bytes(done.out) == expected
     exported = done.root / "results" / "table1"
-    assert (exported / "table.md").read_bytes() == expected["report/table1.md"]
+    assert (exported / "scores.csv").read_bytes() == expected["report/table1.csv"]
+    kept, shown = (exported / "table.md").read_text(), expected["report/table1.md"].decode()
+    assert kept.replace("(scores.csv)", "(table1.csv)") == re.sub(r"\(table1-", "(", shown)
     assert str(exported) in answer.out
 
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
-from analysis.figures.style import COLOURS, INK, new_figure
+from analysis.figures.style import COLOURS, INK, SMALLEST, new_figure
 
 WALL = "#BFC4CA"
 
@@ -34,7 +34,7 @@ def draw_showcase(showcase: Mapping[str, Any], labels: Mapping[str, str]) -> Fig
         _draw_episode(axes, episode, colours)
         method = labels.get(episode["method"], episode["method"])
         skills = episode["task"].split(">")
-        axes.set_title(f"{method}: {episode['accomplished']} of {len(skills)}")
+        axes.set_title(f"{method}: {episode['accomplished']} of {len(skills)} skills")
         axes.set_xlabel(" → ".join(skills))
 
     keys = [Line2D([], [], color=colour, lw=2.2, label=skill) for skill, colour in colours.items()]
@@ -65,7 +65,9 @@ def _draw_map(axes: Axes, showcase: Mapping[str, Any], colours: Mapping[str, str
         axes.add_patch(_square(row, column, WALL))
     for goal, (row, column) in showcase["goals"].items():
         axes.add_patch(_square(row, column, colours[goal], alpha=0.3))
-        axes.text(column + 0.45, row - 0.45, goal, ha="right", va="top", fontsize=7, zorder=4)
+        axes.text(
+            column + 0.45, row - 0.45, goal, ha="right", va="top", fontsize=SMALLEST, zorder=4
+        )
     row, column = showcase["spawn"]
     axes.plot(column, row, "s", color=INK, ms=6, zorder=3)
     height, width = walls.shape

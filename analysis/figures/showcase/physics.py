@@ -89,6 +89,16 @@ def _score(episode: Episode, showcase: Mapping[str, Any], spec: RunSpec) -> str:
     return f"{method}: {episode['accomplished']} of {len(showcase['task'].split(SEPARATOR))} skills"
 
 
+def headline(episode: Episode, showcase: Mapping[str, Any], spec: RunSpec) -> str:
+    """Method, task and outcome, for a picture that is looked at alone."""
+    method = spec.methods.get(episode["method"], episode["method"])
+    skills = len(showcase["task"].split(SEPARATOR))
+    return (
+        f"{method}: {spec.task_label(showcase['task'])}, "
+        f"{episode['accomplished']} of {skills} skills accomplished"
+    )
+
+
 def _draw_value(axes: Axes, episode: Episode) -> None:
     value, spread = np.array(episode["value"]), np.array(episode["spread"])
     for number, start, end in stretches(segment_numbers(episode)):
@@ -118,14 +128,19 @@ def sheet_steps(episode: Episode) -> list[int]:
 
 
 def draw_sheet(
-    episode: Episode, steps: Sequence[int], frames: np.ndarray, labels: Sequence[str]
+    episode: Episode,
+    steps: Sequence[int],
+    frames: np.ndarray,
+    labels: Sequence[str],
+    heading: str,
 ) -> Figure:
     """frames: (N, height, width, 3), one for each of `steps`; stitching ones in a thick frame."""
     numbers = segment_numbers(episode)
     columns = min(COLUMNS, len(steps))
     rows = -(-len(steps) // columns)
     _, height, width, _ = frames.shape
-    figure = new_figure(2.6 * columns, (2.6 * height / width + 0.25) * rows)
+    figure = new_figure(2.6 * columns, (2.6 * height / width + 0.25) * rows + 0.3)
+    figure.suptitle(heading, x=0.005, ha="left", fontsize=11)
     grid = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes, step, frame in zip(grid, steps, frames, strict=False):
         stitching = episode["phase"][step] == "stitch"

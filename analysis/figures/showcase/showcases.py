@@ -10,7 +10,13 @@ from matplotlib.figure import Figure
 from analysis.figures.drawn import DRAWING, PHOTOGRAPH, Drawn
 from analysis.figures.showcase.frames import render_frames
 from analysis.figures.showcase.maze import draw_showcase
-from analysis.figures.showcase.physics import draw_sheet, draw_values, segment_labels, sheet_steps
+from analysis.figures.showcase.physics import (
+    draw_sheet,
+    draw_values,
+    headline,
+    segment_labels,
+    sheet_steps,
+)
 from analysis.figures.showcase.scenes import (
     VIEWS,
     NoPictureError,
@@ -100,7 +106,8 @@ def _sheet(showcase: dict[str, Any], spec: RunSpec) -> Figure:
     episode = showcase["episodes"][-1]
     steps = sheet_steps(episode)
     frames = render_frames(scene_of(showcase, episode), np.array(episode["positions"])[steps])
-    return draw_sheet(episode, steps, frames, segment_labels(showcase, spec))
+    heading = headline(episode, showcase, spec)
+    return draw_sheet(episode, steps, frames, segment_labels(showcase, spec), heading)
 
 
 def _path(showcase: dict[str, Any], spec: RunSpec) -> Figure:

@@ -11,6 +11,7 @@ from analysis.figures.showcase.frames import render_frames
 from analysis.figures.showcase.physics import (
     EQUAL_STEPS,
     draw_sheet,
+    headline,
     segment_labels,
     segment_numbers,
     sheet_steps,
@@ -97,9 +98,17 @@ def test_old_recordings_tell_their_skills_by_name() -> None:
 
 def test_a_sheet_names_what_it_shows() -> None:
     episode = {"segment": [0, 1, 1], "phase": ["execute", "stitch", "execute"]}
-    figure = draw_sheet(episode, [0, 1, 2], np.zeros((3, 6, 8, 3), np.uint8), ["can 1", "can 2"])
+    pictures = np.zeros((3, 6, 8, 3), np.uint8)
+    figure = draw_sheet(episode, [0, 1, 2], pictures, ["can 1", "can 2"], "MB-Stitch: can → can")
+    assert figure.get_suptitle() == "MB-Stitch: can → can"
     titles = [axes.get_title() for axes in figure.axes]
     assert titles == ["step 0: can 1", "step 1: can 2, stitch", "step 2: can 2"]
+
+
+def test_a_sheet_says_method_task_and_outcome() -> None:
+    episode = kitchen_episode("mb-stitch", False)
+    said = headline(episode, {"task": "microwave>kettle>hinge cabinet"}, spec())
+    assert said == "MB-Stitch: microwave → kettle → hinge cabinet, 1 of 3 skills accomplished"
 
 
 def test_bodies_stand_where_the_episode_had_them() -> None:
