@@ -91,10 +91,10 @@ def _option(words: list[str], name: str) -> str:
 def plan(words: list[str], output: Console) -> None:
     """`skillstitch plan SPEC [options]`."""
     from orchestrator.cores import check_workers
+    from orchestrator.costs.estimate import estimate
     from orchestrator.printing import data_lines, forecast_lines, plan_lines, suite_plan_lines
     from orchestrator.storage.ledger import Ledger
     from orchestrator.storage.store import Store
-    from orchestrator.work.costs import estimate
     from orchestrator.work.plan import make_plan
 
     command, asked = _with_spec(PlanCommand, "plan", words)
