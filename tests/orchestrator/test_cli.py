@@ -401,6 +401,19 @@ def test_report(cli: Cli, done: Place, expected: dict[str, bytes]) -> None:
     assert str(exported) in answer.out
 
 
+def test_the_same_results_made_again_elsewhere_change_no_exported_file(
+    cli: Cli, done: Place, tmp_path: Path
+) -> None:
+    results, runs, exported = tmp_path / "results", ("first", "second"), []
+    for name in runs:
+        words = [TINY, "--out", tmp_path / name, *options(done)[3:], "--results", results]
+        assert cli("run", *words).code == 0
+        exported.append({file: file.read_bytes() for file in results.rglob("*") if file.is_file()})
+    first, second = ((tmp_path / name / "provenance.json").read_text() for name in runs)
+    assert first != second
+    assert exported[0] == exported[1]
+
+
 def test_results_of_a_larger_run_stay(cli: Cli, place: Place, done: Place) -> None:
     """Refused before anything runs, and where a report is exported; --force is asked for both."""
     results = place.root / "larger"
