@@ -82,19 +82,30 @@ def test_help_of_each_command(cli: Cli, command: str) -> None:
     assert f"usage: skillstitch {command}" in answer.out
 
 
-def test_every_field_of_a_spec_is_an_option(cli: Cli) -> None:
-    answer = cli("run", "table1", "--help")
-    for option in (
-        "--scale",
-        "--seeds",
-        "--mb-stitch.alpha",
-        "--agent.learning-rate",
-        "--step-limits",
-        "--address",
-        "--out",
-        "--tracking-uri",
-    ):
+BASIC = (
+    "--scale", "--methods", "--lengths", "--tasks", "--step-limits", "--seeds", "--episodes",
+    "--out", "--store", "--workers", "--address", "--tracking-uri", "--results",
+)  # fmt: skip
+SETTINGS = ("--data.noise", "--agent.learning-rate", "--dynamics.width", "--mb-stitch.alpha")
+
+
+@pytest.mark.parametrize("spec", [[], ["table1"]], ids=["no spec", "a spec"])
+def test_every_field_of_a_spec_is_an_option(cli: Cli, spec: list[str]) -> None:
+    answer = cli("run", *spec, "--help-all")
+    assert answer.code == 0
+    for option in (*BASIC, *SETTINGS):
         assert option in answer.out
+
+
+@pytest.mark.parametrize("command", ["run", "plan"])
+def test_help_says_the_basics_alone_and_where_the_rest_is(cli: Cli, command: str) -> None:
+    words = [] if command == "run" else ["table3", "-h"]  # a suite, too
+    basics = cli(command, *(words or ["table1", "--help"])).out
+    settings = [line for line in basics.splitlines() if ".updates" in line or "--agent" in line]
+    assert not settings
+    assert all(option in basics for option in BASIC[:7])
+    assert "--help-all shows the settings of data, models, planners and methods" in basics
+    assert len(basics.splitlines()) < 80
 
 
 @pytest.mark.parametrize(
