@@ -30,6 +30,7 @@ class PlanCommand:
     spec: OfSpec
     store: Path = USUAL_STORE  # where artifacts and finished blocks are kept
     workers: int | None = None  # to estimate the time for; default: all cores
+    address: str | None = None  # of a Ray cluster that they would be on; is not asked anything
     from_sweep: str | None = None  # take a finished sweep's winner: its name or directory
 
 
@@ -114,7 +115,7 @@ def plan(words: list[str], output: Console) -> None:
     from orchestrator.work.plan import make_plan
 
     command, asked = _with_spec(PlanCommand, "plan", words)
-    check_workers(command.workers)
+    check_workers(command.workers, command.address)
     if isinstance(asked, Suite):
         lines = suite_plan_lines(asked, command.store, command.workers)
     else:

@@ -140,6 +140,8 @@ def test_help_says_the_basics_alone_and_where_the_rest_is(cli: Cli, command: str
         (["plan", "table1", "--rollout.skill-limit", "-1"], "skill_limit: must be at least 0"),
         (["run", "table1", "--workers", "0"], "--workers must be at least 1: 0"),
         (["run", "table1", "--workers", "100000"], "give the --address of a Ray cluster"),
+        (["plan", "table1", "--workers", "100000"], "give the --address of a Ray cluster"),
+        (["plan", "table1", "--seeds", "1000", "--episodes", "1000"], "2,440,000 blocks"),
         (["gc"], "name the run directories to keep"),
     ],
 )
