@@ -157,10 +157,15 @@ class Plan:
             "step_limit": self.spec.step_limit,
             "artifacts": {kind: self.models[kind, node.seed, node.method] for kind in alike.models},
         }
-        how = {"settings": alike.settings, "rollout": alike.rollout}
         keys = digests(place | alike.named, "episodes", (text for _, text in chunks))
         for key, (episodes, _) in zip(keys, chunks, strict=True):
-            yield BlockTask(key=key, episodes=episodes, **how, **place)
+            yield BlockTask(
+                key=key,
+                episodes=episodes,
+                settings=alike.settings,
+                rollout=alike.rollout,
+                **place,
+            )
 
 
 def make_plan(spec: Spec) -> Plan:

@@ -121,7 +121,7 @@ def test_the_same_results_again_change_no_file(
     tmp_path: Path, write_run: Callable[..., Path]
 ) -> None:
     """Whenever, wherever and by whichever revision they were made again."""
-    made = [
+    made: list[dict[str, Any]] = [
         {"git_revision": revision, "written": date, "run_id": revision, "seconds": {"training": 1}}
         for revision, date in (("abc", "2026-01-01"), ("def", "2027-01-01"))
     ]
