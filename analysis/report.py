@@ -16,9 +16,9 @@ from analysis.page.page import render_page
 from analysis.page.profile import profile_markdown
 from analysis.page.sources import CSVS, csv_tables, file_name, source_markdown
 from analysis.paper.profile import profiles
-from analysis.results import check_results, provenance_text
+from analysis.results import check_results, write_provenance
 from analysis.run import Run, load_run
-from analysis.schema import PROVENANCE, QUARANTINE, SEGMENTS, SPEC
+from analysis.schema import QUARANTINE, SEGMENTS, SPEC
 from analysis.studies.data import undemonstrated, undemonstrated_note
 from analysis.studies.forecast import forecast_table
 from analysis.studies.models import model_table
@@ -61,12 +61,12 @@ def export_results(run_dir: Path, results_dir: Path, *, force: bool = False) -> 
         with replaced_folder(folder) as draft:
             _copy_table(name, report, studies, drawn, draft)
             _write(draft / "table.md", _markdown(run, table, studies, kept=True))
-            _write(draft / PROVENANCE, provenance_text(run.provenance, run.spec.extent))
             for file in (SPEC, QUARANTINE):
                 if (run_dir / file).is_file():
                     shutil.copyfile(run_dir / file, draft / file)
             in_order = run.segments.sort_values(["seed", "method", "prefix", "episode"])
             in_order.to_parquet(draft / SEGMENTS, index=False)
+            write_provenance(draft, folder, run.provenance, run.spec.extent)
         folders.append(folder)
     return folders
 

@@ -11,6 +11,8 @@ from typing import Any
 from analysis.schema import PROVENANCE, RunError
 
 SCALES = ("smoke", "quick", "standard", "paper")  # from the smallest
+EXPORTED = ("counts", "cpu", "git_revision", "system", "versions")  # of a run's provenance
+DATA = (".csv", ".parquet", ".json")
 Extent = dict[str, str | int]
 """How much there is of results: {"scale": "quick", "seeds": 1, "episodes": 10, …}."""
 
@@ -50,10 +52,32 @@ def _size(value: str | int) -> int:
     return SCALES.index(value) if isinstance(value, str) else value
 
 
+def write_provenance(draft: Path, folder: Path, provenance: dict[str, Any], extent: Extent) -> None:
+    """Add provenance.json to a draft that holds all else of what is to replace a folder.
+
+    Where the draft's data are the folder's to the byte, what made those is said again: so it tells
+    of the first run that had these results, and running it again changes no file.
+    """
+    same = extent_of(folder) == extent and _data(draft) == _data(folder)
+    text = provenance_text(provenance, extent)
+    if same:
+        text = (folder / PROVENANCE).read_text(encoding="utf-8")
+    (draft / PROVENANCE).write_text(text, encoding="utf-8")
+
+
 def provenance_text(provenance: dict[str, Any], extent: Extent) -> str:
-    """What an exported folder's provenance.json says."""
-    said = provenance | {"extent": extent}
+    """What an exported folder's provenance.json says: with what it was made, not when or how fast.
+
+    Times, and what they depend on, are in the run's own directory.
+    """
+    said = {name: provenance[name] for name in EXPORTED if name in provenance} | {"extent": extent}
     return json.dumps(said, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
+
+
+def _data(folder: Path) -> dict[str, bytes]:
+    """Every file that holds results, by name: pictures and texts are drawn from these."""
+    files = (file for file in folder.glob("*") if file.suffix in DATA and file.name != PROVENANCE)
+    return {file.name: file.read_bytes() for file in files}
 
 
 def extent_of(folder: Path) -> Extent:

@@ -80,7 +80,7 @@ def _usage() -> str:
             *lines,
             "",
             f"Specs: {', '.join(packaged_specs())}, or a TOML file. "
-            "COMMAND --help tells the options.",
+            "COMMAND --help tells the options; of run and plan --help-all tells all.",
         ]
     )
 

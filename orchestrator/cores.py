@@ -11,6 +11,7 @@ from orchestrator.errors import UsageError
 
 CGROUPS = Path("/sys/fs/cgroup")
 OWN_CGROUP = Path("/proc/self/cgroup")
+MOST_ON_A_CORE = 8  # workers: each holds a copy of torch and of a simulator
 
 
 def usable_cores() -> int:
@@ -42,7 +43,18 @@ def _limit(group: Path) -> float:
     return math.inf if quota == "max" else int(quota) / int(period)
 
 
-def check_workers(workers: int | None) -> None:
-    """Raise UsageError for a number that nothing could have."""
-    if workers is not None and workers < 1:
+def check_workers(workers: int | None, address: str | None) -> None:
+    """Raise UsageError for a number that nothing could have, or not this machine without a cluster.
+
+    address: of the cluster that they are to be on.
+    """
+    if workers is None:
+        return
+    if workers < 1:
         raise UsageError(f"--workers must be at least 1: {workers}")
+    cores = usable_cores()
+    if address is None and workers > MOST_ON_A_CORE * cores:
+        raise UsageError(
+            f"--workers {workers}: at most {MOST_ON_A_CORE * cores} on this machine's "
+            f"{cores} cores; for more, give the --address of a Ray cluster"
+        )

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from analysis.studies.data import undemonstrated_note
 from orchestrator.cores import usable_cores
+from orchestrator.costs.estimate import CostEstimate, estimate
 from orchestrator.spec.methods import method_label
 from orchestrator.spec.spec import Spec
 from orchestrator.spec.suite import Suite
@@ -15,7 +16,6 @@ from orchestrator.storage.datasets import undemonstrated_skills
 from orchestrator.storage.ledger import Ledger
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.storage.store import CorruptArtifactError, Store
-from orchestrator.work.costs import CostEstimate, estimate
 from orchestrator.work.plan import Plan, make_plan
 
 
@@ -85,14 +85,23 @@ def data_lines(plan: Plan, store: Store) -> Iterator[str]:
 
 def _time_line(costs: list[CostEstimate], workers: int | None) -> str:
     workers = workers or usable_cores()
-    measured = all(each.from_history for each in costs)
-    source = "measured in this store" if measured else "from a reference machine"
     training = sum(each.seconds_training for each in costs)
     evaluation = sum(each.seconds_evaluation for each in costs)
+    measured = sum(each.seconds_measured for each in costs)
     return (
         f"time: {_duration(training)} training and {_duration(evaluation)} evaluation on one core, "
-        f"together about {_duration((training + evaluation) / workers)} on {workers} ({source})"
+        f"together about {_duration((training + evaluation) / workers)} on {workers} "
+        f"({_source(measured, training + evaluation)})"
     )
+
+
+def _source(measured: float, seconds: float) -> str:
+    """Where a time comes from."""
+    share = round(100 * measured / seconds) if seconds else 100
+    if not share:
+        return "counted from the settings"
+    rest = ", the rest counted from the settings" if share < 100 else ""
+    return f"{f'{share} % of it ' if rest else ''}measured in this store{rest}"
 
 
 def _disk_line(costs: list[CostEstimate]) -> str:
@@ -146,4 +155,6 @@ def _duration(seconds: float) -> str:
         return f"{seconds:.0f} s"
     if seconds < 5400:
         return f"{seconds / 60:.0f} min"
-    return f"{seconds / 3600:.1f} h"
+    if seconds < 72 * 3600:
+        return f"{seconds / 3600:.1f} h"
+    return f"{seconds / 86400:,.0f} days"

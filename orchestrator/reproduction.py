@@ -13,12 +13,11 @@ from analysis.report import build_report
 from analysis.schema import PROVENANCE, QUARANTINE
 from analysis.studies.data import undemonstrated_note
 from orchestrator import tracking
-from orchestrator.cores import check_workers, usable_cores
+from orchestrator.cores import check_workers
 from orchestrator.errors import (
     BadDataError,
     IncompleteError,
     SkillstitchError,
-    UsageError,
 )
 from orchestrator.executors import ExecutorKind, open_executor
 from orchestrator.executors.protocol import Executor
@@ -40,8 +39,6 @@ from orchestrator.work.plan import Plan, make_plan
 from orchestrator.work.progress import Progress
 from orchestrator.work.stopwatch import Stopwatch
 
-MOST_ON_A_CORE = 8  # workers: each holds a copy of torch and of a simulator
-
 
 @dataclass(frozen=True)
 class Settings:
@@ -55,15 +52,7 @@ class Settings:
     tracking_uri: str | None = None  # SQLite beside the store; "none" turns tracking off
 
     def __post_init__(self) -> None:
-        check_workers(self.workers)
-        if self.workers is None or self.address is not None:
-            return
-        cores = usable_cores()
-        if self.workers > MOST_ON_A_CORE * cores:
-            raise UsageError(
-                f"--workers {self.workers}: at most {MOST_ON_A_CORE * cores} on this machine's "
-                f"{cores} cores; for more, give the --address of a Ray cluster"
-            )
+        check_workers(self.workers, self.address)
 
     def resolved_tracking_uri(self) -> str:
         return self.tracking_uri or tracking.default_uri(self.store.parent)

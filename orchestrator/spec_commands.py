@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -12,11 +13,13 @@ from rich.console import Console
 
 from orchestrator.errors import IncompleteError, UsageError, said_to_users
 from orchestrator.executors import ExecutorKind
+from orchestrator.spec.options import HELP_ALL, MORE, basics_alone
 from orchestrator.spec.spec import Spec
 from orchestrator.spec.suite import Suite, load_asked, with_specs
 from orchestrator.spec.tomls import packaged_specs
 from orchestrator.storage.store import USUAL_STORE
 
+HELP = {"-h", "--help", HELP_ALL}
 OfSpec = Annotated[Spec, tyro.conf.arg(name="")]  # spec fields are options of the command itself
 
 
@@ -27,6 +30,7 @@ class PlanCommand:
     spec: OfSpec
     store: Path = USUAL_STORE  # where artifacts and finished blocks are kept
     workers: int | None = None  # to estimate the time for; default: all cores
+    address: str | None = None  # of a Ray cluster that they would be on; is not asked anything
     from_sweep: str | None = None  # take a finished sweep's winner: its name or directory
 
 
@@ -53,8 +57,8 @@ def _with_spec(command: type[Any], name: str, words: list[str]) -> tuple[Any, Sp
     """
     program = f"skillstitch {name} SPEC"
     if not words or words[0].startswith("-"):
-        if words and words[0] in ("-h", "--help"):
-            words = [packaged_specs()[0], "--help"]
+        if words and words[0] in HELP:
+            words = [packaged_specs()[0], words[0]]
         else:
             raise UsageError(f"skillstitch {name} needs a spec: {', '.join(packaged_specs())}")
     scale: Any = _option(words, "--scale") or "paper"
@@ -67,7 +71,7 @@ def _with_spec(command: type[Any], name: str, words: list[str]) -> tuple[Any, Sp
     commands = []
     for spec in specs:
         try:
-            commands.append(tyro.cli(command, default=command(spec), args=words[1:], prog=program))
+            commands.append(_parsed(command(spec), words[1:], program))
         except SystemExit as end:
             if end.code and len(specs) > 1:
                 raise UsageError(f"options apply to every part; so read for {spec.name}") from None
@@ -75,6 +79,19 @@ def _with_spec(command: type[Any], name: str, words: list[str]) -> tuple[Any, Sp
     if isinstance(asked, Suite):
         return commands[0], with_specs(asked, [each.spec for each in commands])
     return commands[0], commands[0].spec
+
+
+def _parsed(default: Any, words: list[str], program: str) -> Any:
+    """A command's options, read over its defaults; help says the basics, or all where asked to."""
+    command, more = type(default), ""
+    with ExitStack() as stack:
+        if HELP_ALL in words:
+            words = ["--help"]
+        elif not HELP.isdisjoint(words):
+            stack.enter_context(basics_alone(default.spec))
+            more = MORE
+        description = f"{command.__doc__} {more}"
+        return tyro.cli(command, default=default, args=words, prog=program, description=description)
 
 
 def _option(words: list[str], name: str) -> str:
@@ -91,14 +108,14 @@ def _option(words: list[str], name: str) -> str:
 def plan(words: list[str], output: Console) -> None:
     """`skillstitch plan SPEC [options]`."""
     from orchestrator.cores import check_workers
+    from orchestrator.costs.estimate import estimate
     from orchestrator.printing import data_lines, forecast_lines, plan_lines, suite_plan_lines
     from orchestrator.storage.ledger import Ledger
     from orchestrator.storage.store import Store
-    from orchestrator.work.costs import estimate
     from orchestrator.work.plan import make_plan
 
     command, asked = _with_spec(PlanCommand, "plan", words)
-    check_workers(command.workers)
+    check_workers(command.workers, command.address)
     if isinstance(asked, Suite):
         lines = suite_plan_lines(asked, command.store, command.workers)
     else:

@@ -24,8 +24,9 @@ Episodes = Annotated[int, Interval(ge=1, le=10**5)]
 SeedNumber = Annotated[int, Interval(ge=0, lt=1000)]  # one of a spec's seeds
 Seed = Annotated[int, Interval(ge=0, lt=2**63)]
 
-Positive = Annotated[float, Interval(gt=0)]
-NotNegative = Annotated[float, Interval(ge=0)]
+Positive = Annotated[float, Interval(gt=0, le=10**6)]  # what is larger drowns all beside it
+NotNegative = Annotated[float, Interval(ge=0, le=10**6)]
+Times = Annotated[float, Interval(ge=0, le=1000)]  # as much as is usual
 LearningRate = Annotated[float, Interval(gt=0, le=1)]
 Share = Annotated[float, Interval(ge=0, le=1)]
 ShareBelowOne = Annotated[float, Interval(ge=0, lt=1)]

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from orchestrator.costs.estimate import CostEstimate, estimate
 from orchestrator.spec.spec import Spec
 from orchestrator.storage.ledger import Ledger
 from orchestrator.storage.store import Store
-from orchestrator.work.costs import CostEstimate, estimate
 from orchestrator.work.plan import make_plan
 from sweeps.search import search_spec
 from sweeps.spec import SweepSpec

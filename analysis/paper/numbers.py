@@ -24,8 +24,7 @@ def _read() -> pd.DataFrame:
 def paper_table(number: str) -> pd.DataFrame:
     """Columns row, tasks, method, score, error, note of a table of the paper; empty if it has none.
 
-    `tasks` is over how many tasks a row's scores are means: in Tables 1 and 2 all permutations of
-    that length, in Table 8 those that end with its skill, elsewhere one.
+    `tasks` is over how many tasks a row's scores are means (`analysis.paper.tasks` has which).
     `error` is the number after the paper's ±, which it calls the variance over three seeds.
     """
     cells = _read()
@@ -38,12 +37,6 @@ def paper_scores(number: str) -> dict[tuple[str, str], tuple[float, float]]:
     keys = zip(cells["row"], cells["method"], strict=True)
     numbers = zip(cells["score"], cells["error"], strict=True)
     return {key: cell for key, cell in zip(keys, numbers, strict=True) if key[1] != NET_GAIN}
-
-
-def paper_tasks(number: str) -> dict[str, int]:
-    """Row -> the tasks that its scores in the paper are means over."""
-    cells = paper_table(number)
-    return dict(zip(cells["row"], cells["tasks"].astype(int), strict=True))
 
 
 def accomplished_skills(number: str, method: str) -> pd.Series:

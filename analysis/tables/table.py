@@ -1,15 +1,16 @@
 """A table of a run: every cell's score, and the gains of one method over another."""
 
 from collections import Counter
-from collections.abc import Container, Mapping
+from collections.abc import Container
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import pandas as pd
 
-from analysis.paper.numbers import paper_scores, paper_tasks
+from analysis.paper.numbers import paper_scores
 from analysis.paper.orders import Cells, by_order, order_duels
+from analysis.paper.tasks import paper_tasks
 from analysis.schema import RunSpec, TableEntry
 from analysis.statistics import arrange, estimate, generator, paired_gain
 from analysis.tables.distribution import Distribution, cell_distributions
@@ -38,7 +39,7 @@ class Table:
     orders: pd.DataFrame  # GAIN_COLUMNS: Table 4's leaders by order of skills, no line elsewhere
     expected: dict[tuple[str, str], int]  # (row, method) -> episodes of a complete cell
     labels: dict[str, str]  # method -> how the table's head calls it
-    other_tasks: dict[str, tuple[int, int]]  # row -> tasks here and in the paper, where they differ
+    other_tasks: dict[str, tuple[int, int]]  # row of others than the paper's -> how many, and its
 
     @property
     def rows(self) -> list[str]:
@@ -79,7 +80,7 @@ def build_table(episodes: pd.DataFrame, spec: RunSpec, entry: TableEntry) -> Tab
     cells = _cells(episodes, places)
     orders, long_task = by_order(cells), spec.task_label(spec.long_task)
     tasks_of_cell = Counter(zip(places["row"], places["column"], strict=True))
-    other_tasks = _other_tasks(tasks_of_cell, entry)
+    other_tasks = _other_tasks(places, spec, entry)
     scores = score_table(cells, entry, other_tasks)
     labels = column_labels(spec)
     gain_pairs, lead_pairs = _gain_pairs(cells, entry), _lead_pairs(scores)
@@ -112,14 +113,14 @@ def _cells(episodes: pd.DataFrame, places: pd.DataFrame) -> Cells:
 
 
 def _other_tasks(
-    tasks_of_cell: Mapping[tuple[str, str], int], entry: TableEntry
+    places: pd.DataFrame, spec: RunSpec, entry: TableEntry
 ) -> dict[str, tuple[int, int]]:
-    """Rows that are means over another number of tasks than the paper's: here, and there."""
+    """Rows that are means over other tasks than the paper's: how many here, and there."""
     printed = paper_tasks(entry.paper)
     return {
-        row: (tasks, printed[row])
-        for (row, _), tasks in tasks_of_cell.items()
-        if row in printed and tasks != printed[row]
+        row: (len(tasks), len(printed[row]))
+        for (row, _), tasks in places.groupby(["row", "column"], sort=False)["task"]
+        if row in printed and set(map(spec.task_label, tasks)) != printed[row]
     }
 
 

@@ -52,8 +52,7 @@ def describe(table: Table) -> list[str]:
             for row, (here, paper) in table.other_tasks.items()
         )
         lines.append(
-            "Not beside the paper's numbers, which are means over another number of tasks: "
-            f"{', '.join(rows)}."
+            f"Not beside the paper's numbers, which are means over other tasks: {', '.join(rows)}."
         )
     if table.missing:
         asked, missing = sum(table.expected.values()), sum(table.missing.values())

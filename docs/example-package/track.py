@@ -118,5 +118,5 @@ TRACK_ENTRY = BenchmarkEntry(
     TrackData,
     lambda config: {"demonstrations": Dataset("track-demonstrations")},
     {"track-demonstrations": Builder(_build, ("track",), ("orchestrator.builders.parts",))},
-    Costs(update={"agent": 0.003, "dynamics": 0.003}, planned_segment=0.01, segment=0.002),
+    Costs(segment=0.002),
 )

@@ -38,13 +38,15 @@ class Illustration:
 
 @dataclass(frozen=True)
 class Costs:
-    """What work costs where a store has no history yet: on one core of a 2-core cloud machine."""
+    """What work costs where a store has no history yet: on one core of a 2-core cloud machine.
 
-    update: dict[str, float]  # s of training, by kind of model
+    Trainings and plans are counted from their settings (orchestrator.costs.effort).
+    """
+
     demonstration: dict[str, float] = field(default_factory=dict)  # s each, by kind of dataset
     whole: dict[str, float] = field(default_factory=dict)  # s of other artifacts, by kind
-    planned_segment: float = 0.0  # s, of a method that plans
-    segment: float = 0.0  # s, of the others
+    segment: float = 0.0  # s, of a segment without plans
+    plans: float = 1.0  # full ones in a segment that stitches until a value falls
     success: float = 0.5  # of a skill
     segment_bytes: int = 0
 

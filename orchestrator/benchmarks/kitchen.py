@@ -56,12 +56,6 @@ KITCHEN_ENTRY = BenchmarkEntry(
     _datasets,
     KITCHEN_BUILDERS | LONG_HORIZON_BUILDERS | STUDIES.builders,
     Costs(
-        update={
-            "agent": 0.022,
-            "mf-policy": 0.011,
-            "single-policy": 0.011,
-            "dynamics": 0.008,
-        },
         demonstration={
             "kitchen-demonstrations": 0.8,
             "kitchen-long-horizon": 0.6,
@@ -72,8 +66,8 @@ KITCHEN_ENTRY = BenchmarkEntry(
             "kitchen-diagnosis": 120.0,
             "kitchen-showcase": 60.0,
         },
-        planned_segment=1.6,
         segment=0.26,
+        plans=1.1,
         success=0.3,
         segment_bytes=1300,
     ),

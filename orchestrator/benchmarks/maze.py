@@ -26,9 +26,8 @@ MAZE_ENTRY = BenchmarkEntry(
     _datasets,
     MAZE_BUILDERS | {"maze-showcase": maze_showcase_builder(MAZE)},
     Costs(
-        update={"agent": 0.005, "mf-policy": 0.003, "dynamics": 0.005},
-        planned_segment=0.005,
         segment=0.003,
+        plans=0.3,
         success=0.9,
         segment_bytes=120,
     ),

@@ -31,15 +31,14 @@ def _entry(benchmark: Benchmark, *task: str) -> BenchmarkEntry:
         _datasets,
         ROBOSUITE_BUILDERS | STUDIES.builders,
         Costs(
-            update={"agent": 0.03, "mf-policy": 0.01, "dynamics": 0.01},
             demonstration={"robosuite-demonstrations": 0.6, "robosuite-held-out": 0.6},
             whole={
                 "robosuite-stitches": 150.0,
                 "robosuite-diagnosis": 60.0,
                 "robosuite-showcase": 60.0,
             },
-            planned_segment=4.0,
             segment=0.6,
+            plans=3.2,
             success=0.5,
             segment_bytes=1000,
         ),

@@ -6,10 +6,10 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+from orchestrator.costs.expectations import Expectations
 from orchestrator.executors.protocol import Executor
 from orchestrator.storage.ledger import Ledger, Outcome, PlayCounts
 from orchestrator.storage.store import Store
-from orchestrator.work.costs import seconds_each
 from orchestrator.work.jobs import ATTEMPTS, BlockReport, BlockTask, PlayJob, Report
 from orchestrator.work.plan import Node, Plan
 from orchestrator.work.progress import Progress
@@ -32,7 +32,6 @@ class Evaluation:
     seconds: float = 0.0  # that workers were busy playing
     _ready: deque[tuple[Node, int]] = field(default_factory=deque)
     _in_flight: int = 0
-    _history: dict[str, PlayCounts] = field(default_factory=dict)
     _attempts: dict[str, int] = field(default_factory=dict)  # failed ones, of this command
     _given_up: set[str] = field(default_factory=set)
     _alone: set[str] = field(default_factory=set)  # blocks whose worker died: to be sent singly
@@ -42,7 +41,7 @@ class Evaluation:
         self.progress.phase("evaluation", len(self.plan.tasks), 0)
         self._place = {task.key: place for place, task in self.plan.tasks.items()}
         self._adopt()
-        self._history = self.shared.history()
+        self._expected = Expectations(self.plan, self.shared.history())
         for root in self.plan.roots():
             for chunk in range(len(self.plan.chunks)):
                 self._expand(root, chunk)
@@ -112,7 +111,7 @@ class Evaluation:
     def _expected_seconds(self, task: BlockTask, parent: Outcome | None) -> float:
         first, end = task.episodes
         segments = end - first if parent is None else parent.survivors
-        return segments * seconds_each(task, self._history)
+        return segments * self._expected.seconds_each(*self._place[task.key])
 
     def _next_key(self) -> str:
         return self.plan.tasks[self._ready[0]].key
@@ -144,7 +143,7 @@ class Evaluation:
                 self._expand(*self._place[block.key])
 
     def _remember(self, job: PlayJob, reports: Iterable[BlockReport]) -> None:
-        kinds = {task.key: task.kind for task, _ in job.tasks}
+        kinds = {task.key: self._expected.kind(*self._place[task.key]) for task, _ in job.tasks}
         sums: dict[str, PlayCounts] = {}
         for block in reports:
             if block.outcome is not None:
@@ -154,8 +153,7 @@ class Evaluation:
                 sums[kind] = sums[kind] + played if kind in sums else played
         for kind, played in sums.items():
             self.shared.add_played(kind, played)
-            known = self._history.get(kind)
-            self._history[kind] = played if known is None else known + played
+            self._expected.remember(kind, played)
 
     def _failed(self, key: str, error: str, *, single: bool) -> None:
         """Count a failure and queue the block again, or give it up after three attempts.

@@ -44,11 +44,6 @@ class BlockTask:
     artifacts: dict[str, str]  # kind → key: the policies, and what the stitcher needs
 
     @property
-    def kind(self) -> str:
-        """What segments like this one's are called where it is remembered how they went."""
-        return f"{self.benchmark}, {self.method or 'any method'}, skill {len(self.prefix)}"
-
-    @property
     def name(self) -> str:
         method = f" by {self.method}" if self.method else ""
         first, last = self.episodes[0], self.episodes[1] - 1

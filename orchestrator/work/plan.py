@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import ceil
 from typing import Any
 
 from orchestrator.builders.registry import BLOCK_CODE, BLOCK_SETUP
+from orchestrator.errors import UsageError
 from orchestrator.spec.methods import (
     SHARED,
     first_method,
@@ -21,11 +23,13 @@ from orchestrator.spec.spec import Spec
 from orchestrator.spec.structure import Plain, to_plain
 from orchestrator.work.artifacts import Recipes
 from orchestrator.work.jobs import BlockTask
-from orchestrator.work.recipes import Recipe, code_fingerprint, digest
+from orchestrator.work.recipes import Recipe, canonical, code_fingerprint, digests
 from stitching.methods.protocol import MethodSettings
 from stitching.rollout import RolloutConfig
 
 Prefix = tuple[str, ...]
+
+MOST_BLOCKS = 10**6  # of a plan, which then takes half a gigabyte of the driver's memory
 
 
 @dataclass(frozen=True)
@@ -102,10 +106,11 @@ class Plan:
     @cached_property
     def tasks(self) -> dict[tuple[Node, int], BlockTask]:
         """Every block by node and chunk, parents first."""
+        chunks = [(episodes, canonical(episodes)) for episodes in self.chunks]
         return {
-            (node, chunk): self.task(node, chunk)
+            (node, chunk): task
             for node in self.nodes
-            for chunk in range(len(self.chunks))
+            for chunk, task in enumerate(self._tasks(node, chunks))
         }
 
     @cached_property
@@ -137,6 +142,11 @@ class Plan:
 
     def task(self, node: Node, chunk: int) -> BlockTask:
         """One block, without naming all others."""
+        episodes = self.chunks[chunk]
+        return next(self._tasks(node, [(episodes, canonical(episodes))]))
+
+    def _tasks(self, node: Node, chunks: list[tuple[tuple[int, int], str]]) -> Iterator[BlockTask]:
+        """A node's blocks of these episodes, which names contain as the text beside them."""
         alike = self.method_blocks[node.method]
         place: dict[str, Any] = {
             "benchmark": self.spec.benchmark,
@@ -144,16 +154,26 @@ class Plan:
             "seed": node.seed,
             "method": alike.name,
             "prefix": node.prefix,
-            "episodes": self.chunks[chunk],
             "step_limit": self.spec.step_limit,
             "artifacts": {kind: self.models[kind, node.seed, node.method] for kind in alike.models},
         }
-        key = digest(place | alike.named)
-        return BlockTask(key=key, settings=alike.settings, rollout=alike.rollout, **place)
+        keys = digests(place | alike.named, "episodes", (text for _, text in chunks))
+        for key, (episodes, _) in zip(keys, chunks, strict=True):
+            yield BlockTask(
+                key=key,
+                episodes=episodes,
+                settings=alike.settings,
+                rollout=alike.rollout,
+                **place,
+            )
 
 
 def make_plan(spec: Spec) -> Plan:
-    """Expand a spec. Pure: looks at neither store nor ledger."""
+    """Expand a spec. Pure: looks at neither store nor ledger.
+
+    Raises UsageError where there would be more blocks than memory is meant to hold.
+    """
+    _check_size(spec)
     recipes = Recipes(spec)
     recipes.add_datasets()
     recipes.add_models()
@@ -164,22 +184,31 @@ def make_plan(spec: Spec) -> Plan:
         recipes.models,
         recipes.datasets | recipes.long_horizon,
         recipes.illustrations,
-        tuple(_nodes(spec)),
+        tuple(node for seed in range(spec.seeds) for node in _nodes(spec, seed)),
     )
 
 
-def _nodes(spec: Spec) -> list[Node]:
+def _check_size(spec: Spec) -> None:
+    blocks = len(_nodes(spec, 0)) * spec.seeds * ceil(spec.episodes / spec.block_episodes)
+    if blocks > MOST_BLOCKS:
+        raise UsageError(
+            f"spec {spec.name}: {blocks:,} blocks, and a plan holds at most {MOST_BLOCKS:,}; ask "
+            "for larger block_episodes, or for fewer episodes, seeds, methods or tasks"
+        )
+
+
+def _nodes(spec: Spec, seed: int) -> list[Node]:
     """Every prefix of every task, parents first, each once."""
-    nodes: dict[tuple[int, str, Prefix], Node] = {}
-    for seed in range(spec.seeds):
-        for depth in range(1, max(map(len, spec.all_tasks)) + 1):
-            for method in spec.methods:
-                first = first_method(method, spec.rollout)
-                player = method if depth > 1 else first
-                above = method if depth > 2 else first
-                for task in spec.all_tasks:
-                    place = seed, player, task[:depth]
-                    if len(task) >= depth and place not in nodes:
-                        parent = nodes[seed, above, task[: depth - 1]] if depth > 1 else None
-                        nodes[place] = Node(*place, parent)
+    nodes: dict[tuple[str, Prefix], Node] = {}
+    tasks = spec.all_tasks
+    for depth in range(1, max(map(len, tasks)) + 1):
+        for method in spec.methods:
+            first = first_method(method, spec.rollout)
+            player = method if depth > 1 else first
+            above = method if depth > 2 else first
+            for task in tasks:
+                place = player, task[:depth]
+                if len(task) >= depth and place not in nodes:
+                    parent = nodes[above, task[: depth - 1]] if depth > 1 else None
+                    nodes[place] = Node(seed, *place, parent)
     return list(nodes.values())

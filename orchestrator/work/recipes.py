@@ -7,7 +7,7 @@ import hashlib
 import importlib.metadata
 import importlib.util
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -17,6 +17,7 @@ from orchestrator.builders.registry import BUILDERS
 from orchestrator.spec.structure import Plain
 
 OUR_PACKAGE = "stitching"
+DIGITS = 32  # of names
 # Lists of parts: a part that is used is named by itself, and no other decides anything.
 NOT_FOLLOWED = {"stitching.registry", "stitching.planning.registry", "stitching.methods.registry"}
 CODE = (".py", ".so", ".pyd")
@@ -31,7 +32,21 @@ def canonical(plain: Any) -> str:
 
 def digest(plain: Any) -> str:
     """Stable name of a plain value: 32 hex digits."""
-    return hashlib.sha256(canonical(plain).encode()).hexdigest()[:32]
+    return hashlib.sha256(canonical(plain).encode()).hexdigest()[:DIGITS]
+
+
+def digests(plain: Plain, field: str, values: Iterable[str]) -> Iterator[str]:
+    """Of each value the `digest` of `plain | {field: value}`; the rest is hashed but once.
+
+    values: as `canonical` writes them.
+    """
+    gap = "\0"
+    before, after = canonical(plain | {field: gap}).split(canonical(gap))
+    begun = hashlib.sha256(before.encode())
+    for value in values:
+        whole = begun.copy()
+        whole.update(f"{value}{after}".encode())
+        yield whole.hexdigest()[:DIGITS]
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ from stitching.bounds import (
     Share,
     ShareAboveZero,
     ShareBelowOne,
+    Times,
     Width,
     WidthOrNone,
 )
@@ -73,7 +74,7 @@ class IQLConfig(Bounded):
     precision: Precision = "float32"  # of the hidden layers while training
     multi_task: bool = True  # one set of networks for all skills (Maze, Kitchen), or one a skill
     swap: Share = 0.0  # share of the transitions in which objects that play no part are swapped
-    corrections: NotNegative = 0.0  # steps by which the robot is displaced in half of the others
+    corrections: Times = 0.0  # steps by which the robot is displaced in half of the others
     clip: bool = False  # what is seen is held to the range that the data have, number by number
     log_every: Count = 500
 

@@ -13,7 +13,7 @@ from optuna.importance import get_param_importances
 from analysis.figures.drawn import DRAWING
 from analysis.files import replaced_folder
 from analysis.report import export_results
-from analysis.results import check_results, provenance_text
+from analysis.results import check_results, write_provenance
 from analysis.schema import PROVENANCE, leaves
 from analysis.tables.writers import to_csv
 from orchestrator.spec.structure import Plain
@@ -71,10 +71,10 @@ def write_report(
                     shutil.copyfile(source, exported / "figures" / f"sweep-{source.name}")
     elif results is not None:
         check_results(results, results_names(sweep), sweep.extent, force)
-        with replaced_folder(results / sweep.name) as folder:
-            shutil.copytree(directory.path / "report", folder, dirs_exist_ok=True)
+        with replaced_folder(results / sweep.name) as draft:
+            shutil.copytree(directory.path / "report", draft, dirs_exist_ok=True)
             provenance = directory.read_json(PROVENANCE) or {}
-            _write(folder / PROVENANCE, provenance_text(provenance, sweep.extent))
+            write_provenance(draft, results / sweep.name, provenance, sweep.extent)
 
 
 def field_importances(study: SweepStudy) -> dict[str, float]:

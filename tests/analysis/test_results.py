@@ -117,6 +117,39 @@ def test_an_export_says_its_extent_and_keeps_to_it(
     assert extent_of(folder) == extent
 
 
+def test_the_same_results_again_change_no_file(
+    tmp_path: Path, write_run: Callable[..., Path]
+) -> None:
+    """Whenever, wherever and by whichever revision they were made again."""
+    made: list[dict[str, Any]] = [
+        {"git_revision": revision, "written": date, "run_id": revision, "seconds": {"training": 1}}
+        for revision, date in (("abc", "2026-01-01"), ("def", "2027-01-01"))
+    ]
+    runs = [
+        write_run(tmp_path / one["run_id"], training=None, showcase=None, provenance=one)
+        for one in made
+    ]
+    (folder,) = export_results(runs[0], tmp_path / "results")
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    said = json.loads((folder / "provenance.json").read_text())
+    assert said == {"git_revision": "abc", "extent": extent_of(folder)}
+    export_results(runs[1], tmp_path / "results")
+    assert before == {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_other_results_say_what_made_them(
+    tmp_path: Path, write_run: Callable[..., Path], segments: pd.DataFrame
+) -> None:
+    other = segments.assign(steps=segments["steps"] + 1)
+    runs = [
+        write_run(tmp_path / name, one, training=None, showcase=None, provenance={"cpu": name})
+        for name, one in (("a", segments), ("b", other))
+    ]
+    for run, name in zip(runs, "ab", strict=True):
+        (folder,) = export_results(run, tmp_path / "results")
+        assert json.loads((folder / "provenance.json").read_text())["cpu"] == name
+
+
 def test_all_that_is_committed_says_how_much_it_is() -> None:
     folders = list(RESULTS.iterdir())
     assert len(folders) >= 8

@@ -83,19 +83,30 @@ def test_help_of_each_command(cli: Cli, command: str) -> None:
     assert f"usage: skillstitch {command}" in answer.out
 
 
-def test_every_field_of_a_spec_is_an_option(cli: Cli) -> None:
-    answer = cli("run", "table1", "--help")
-    for option in (
-        "--scale",
-        "--seeds",
-        "--mb-stitch.alpha",
-        "--agent.learning-rate",
-        "--step-limits",
-        "--address",
-        "--out",
-        "--tracking-uri",
-    ):
+BASIC = (
+    "--scale", "--methods", "--lengths", "--tasks", "--step-limits", "--seeds", "--episodes",
+    "--out", "--store", "--workers", "--address", "--tracking-uri", "--results",
+)  # fmt: skip
+SETTINGS = ("--data.noise", "--agent.learning-rate", "--dynamics.width", "--mb-stitch.alpha")
+
+
+@pytest.mark.parametrize("spec", [[], ["table1"]], ids=["no spec", "a spec"])
+def test_every_field_of_a_spec_is_an_option(cli: Cli, spec: list[str]) -> None:
+    answer = cli("run", *spec, "--help-all")
+    assert answer.code == 0
+    for option in (*BASIC, *SETTINGS):
         assert option in answer.out
+
+
+@pytest.mark.parametrize("command", ["run", "plan"])
+def test_help_says_the_basics_alone_and_where_the_rest_is(cli: Cli, command: str) -> None:
+    words = [] if command == "run" else ["table3", "-h"]  # a suite, too
+    basics = cli(command, *(words or ["table1", "--help"])).out
+    settings = [line for line in basics.splitlines() if ".updates" in line or "--agent" in line]
+    assert not settings
+    assert all(option in basics for option in BASIC[:7])
+    assert "--help-all shows the settings of data, models, planners and methods" in basics
+    assert len(basics.splitlines()) < 80
 
 
 @pytest.mark.parametrize(
@@ -130,6 +141,8 @@ def test_every_field_of_a_spec_is_an_option(cli: Cli) -> None:
         (["plan", "table1", "--rollout.skill-limit", "-1"], "skill_limit: must be at least 0"),
         (["run", "table1", "--workers", "0"], "--workers must be at least 1: 0"),
         (["run", "table1", "--workers", "100000"], "give the --address of a Ray cluster"),
+        (["plan", "table1", "--workers", "100000"], "give the --address of a Ray cluster"),
+        (["plan", "table1", "--seeds", "1000", "--episodes", "1000"], "2,440,000 blocks"),
         (["gc"], "name the run directories to keep"),
     ],
 )
@@ -402,6 +415,19 @@ def test_report(cli: Cli, done: Place, expected: dict[str, bytes]) -> None:
     kept, shown = (exported / "table.md").read_text(), expected["report/table1.md"].decode()
     assert kept.replace("(scores.csv)", "(table1.csv)") == re.sub(r"\(table1-", "(", shown)
     assert str(exported) in answer.out
+
+
+def test_the_same_results_made_again_elsewhere_change_no_exported_file(
+    cli: Cli, done: Place, tmp_path: Path
+) -> None:
+    results, runs, exported = tmp_path / "results", ("first", "second"), []
+    for name in runs:
+        words = [TINY, "--out", tmp_path / name, *options(done)[3:], "--results", results]
+        assert cli("run", *words).code == 0
+        exported.append({file: file.read_bytes() for file in results.rglob("*") if file.is_file()})
+    first, second = ((tmp_path / name / "provenance.json").read_text() for name in runs)
+    assert first != second
+    assert exported[0] == exported[1]
 
 
 def test_results_of_a_larger_run_stay(cli: Cli, place: Place, done: Place) -> None:

@@ -10,7 +10,7 @@ import pytest
 from annotated_types import Interval
 
 from orchestrator.spec.spec import Spec
-from stitching.bounds import Amount, Bounded, Count, Inside, NotNegative, Share
+from stitching.bounds import Amount, Bounded, Count, Inside, NotNegative, Positive, Share, Times
 from stitching.methods.registry import METHODS
 from sweeps.spec import SweepSpec
 
@@ -30,6 +30,8 @@ class Example(Bounded):
     several: tuple[Amount, ...] = ()
     named: dict[str, NotNegative] | None = None
     maybe: Count | None = None
+    price: Positive = 1.0
+    weights: dict[str, Times] | None = None
 
 
 @pytest.mark.parametrize(
@@ -44,6 +46,9 @@ class Example(Bounded):
         ({"share": float("nan")}, "share: must be a finite number: nan"),
         ({"free": float("inf")}, "free: must be a finite number: inf"),
         ({"several": (1, -1)}, r"several\[1\]: must be at least 0: -1"),
+        ({"price": 1e7}, "price: must be at most 1000000: 10000000.0"),
+        ({"price": 0.0}, "price: must be above 0: 0.0"),
+        ({"weights": {"a": 1001.0}}, "weights, a: must be at most 1000: 1001.0"),
         ({"named": {"a": 1.0, "b": -2.0}}, "named, b: must be at least 0: -2.0"),
         ({"maybe": 0}, "maybe: must be at least 1: 0"),
     ],
@@ -91,7 +96,10 @@ def test_every_number_of_every_setting_has_a_range() -> None:
             inner = get_args(hint)[1] if get_origin(hint) is dict else hint
             for part in parts(inner):
                 assert name in ANYWHERE or part not in (int, float), f"{name} has no range"
-                numbers += get_origin(part) is Annotated
+                for bound in [one for one in get_args(part) if isinstance(one, Interval)]:
+                    assert (bound.ge, bound.gt) != (None, None), f"{name} may be any small number"
+                    assert (bound.le, bound.lt) != (None, None), f"{name} may be any large number"
+                    numbers += 1
         if any(get_origin(part) is Annotated for hint in hints.values() for part in parts(hint)):
             assert issubclass(cls, Bounded), f"{cls.__name__} does not check its ranges"
     assert numbers > 60

@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from stitching.bounds import Amount, Bounded, Count, Episodes, NotNegative, Share
+from stitching.bounds import Amount, Bounded, Count, Episodes, Share, Times
 from stitching.data.kitchen.arm import GRIP_OPEN, HOME, Arm
 from stitching.data.kitchen.programs import PROGRAMS, Program, Style, perform, relocate, style
 from stitching.data.kitchen.segments import Episode, Order, Segment, as_transitions, cut
@@ -52,7 +52,7 @@ class KitchenDataConfig(Bounded):
     human: str = ""  # for people's: `file` by an older name
     episodes: Episodes = 24  # demonstrations an order
     # First skill of an order → times as many demonstrations of it.
-    first_weights: dict[str, NotNegative] = field(default_factory=dict)
+    first_weights: dict[str, Times] = field(default_factory=dict)
     held_out: Amount = 8  # more of each order, to judge models by
     quality: Share = 0.9  # of the demonstrator: from 1, an expert, down to 0
     qualities: dict[str, Share] = field(default_factory=dict)  # skill → another quality for it

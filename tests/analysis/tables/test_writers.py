@@ -51,6 +51,32 @@ def test_rows_of_other_tasks_stand_alone(episodes: pd.DataFrame, spec: RunSpec) 
     assert "paper 0.986" not in text
 
 
+def test_as_many_tasks_as_the_paper_s_are_not_the_paper_s(
+    episodes: pd.DataFrame, spec: RunSpec
+) -> None:
+    """Twelve of two goals, one of which comes twice."""
+    pairs = [task for task in spec.tasks if task.count(">") == 1]
+    repeated = ["g0>g0" if task == "g1>g0" else task for task in pairs]
+    renamed = episodes.assign(task=episodes["task"].replace("g1>g0", "g0>g0"))
+    table = build_table(renamed, replace(spec, tasks=tuple(repeated)), spec.tables[0])
+    assert table.other_tasks == {"2 goals": (12, 12)}
+    assert table.leads.empty
+    assert "paper 0.986" not in to_markdown(table)
+
+
+@pytest.mark.parametrize(
+    ("task", "alone"), [("open door>close door", 0), ("close door>open door", 4)]
+)
+def test_a_row_that_is_a_variant_is_of_the_paper_s_task(
+    episodes: pd.DataFrame, spec: RunSpec, task: str, alone: int
+) -> None:
+    """Table 5's levels name no task, so the row's label does not tell."""
+    methods = {f"no-stitch@level-{n}": f"No-Stitch @level-{n}" for n in (1, 2, 3, 4)}
+    parts = replace(spec, tasks=(task,), methods=methods, skills=tuple(task.split(">")), parts=())
+    entry = replace(spec.tables[0], paper="5", rows="variant")
+    assert len(build_table(episodes, parts, entry).other_tasks) == alone
+
+
 def test_a_smoke_run_shows_the_papers_numbers_without_a_verdict(table: Table) -> None:
     text = to_markdown(replace(table, spec=replace(table.spec, scale="smoke")))
     assert "paper 0.986 ± 0.000 |" in text

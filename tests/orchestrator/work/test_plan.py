@@ -14,7 +14,7 @@ from orchestrator.errors import UsageError
 from orchestrator.spec.methods import first_method, playing_modules
 from orchestrator.spec.spec import Spec, load_spec
 from orchestrator.work.artifacts import MODELS
-from orchestrator.work.plan import Node, Plan, make_plan
+from orchestrator.work.plan import MOST_BLOCKS, Node, Plan, make_plan
 from orchestrator.work.recipes import _closure
 from stitching.data.mixtures import Mixture
 from stitching.envs.kitchen import KITCHEN
@@ -255,3 +255,24 @@ def test_what_belongs_together_names_an_agent_that_alters_it(setting: Altered) -
     assert agent.params["factors"]["own"]["kettle"] == "kettle"
     usual = make_plan(kitchen)
     assert "factors" not in usual.recipes[usual.by_seed("agent")[0]].params
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"episodes": 100_000, "block_episodes": 1}, {"seeds": 1000, "episodes": 1000}],
+    ids=["small blocks", "many seeds"],
+)
+def test_more_blocks_than_fit_are_refused_unexpanded(spec: Spec, changes: dict[str, int]) -> None:
+    with pytest.raises(UsageError, match=r"spec table1: [\d,]+ blocks, .* ask for larger block_ep"):
+        make_plan(replace(spec, **changes))  # type: ignore[arg-type]
+
+
+def test_the_largest_plans_of_the_paper_s_tables_are_small() -> None:
+    for name in ("table1", "table2", "table3-door"):
+        plan = make_plan(load_spec(name))
+        assert 5 * len(plan.nodes) * len(plan.chunks) < MOST_BLOCKS
+
+
+def test_a_block_alone_is_called_as_among_all(plan: Plan) -> None:
+    for place in (*list(plan.tasks)[:3], *list(plan.tasks)[-3:]):
+        assert plan.task(*place) == plan.tasks[place]

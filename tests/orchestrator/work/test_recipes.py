@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.work import recipes
-from orchestrator.work.recipes import Recipe, canonical, code_fingerprint, digest
+from orchestrator.work.recipes import Recipe, canonical, code_fingerprint, digest, digests
 
 
 def clear() -> None:
@@ -134,3 +134,11 @@ def test_digests_are_stable_across_processes() -> None:
     assert digest(plain) == "cacedc786abc936ff5388c20aad7a580"
     with pytest.raises(ValueError, match="not JSON compliant"):
         digest({"x": float("nan")})
+
+
+def test_digests_that_differ_in_one_field_are_the_same_as_one_by_one() -> None:
+    plain = {"a": {"episodes": [0, 1]}, "name": "Σ", "prefix": ["x", "y"], "z": 0.1}
+    values = [[0, 100], [100, 150], "text", None]
+    for field in ("episodes", "z", "0"):
+        expected = [digest(plain | {field: value}) for value in values]
+        assert list(digests(plain, field, map(canonical, values))) == expected

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
 from orchestrator.benchmarks.registry import ENTRIES
+from orchestrator.costs.effort import Training, training_of
+from orchestrator.costs.expectations import Expectations
+from orchestrator.costs.likeness import Likeness
 from orchestrator.spec.methods import method_rollout
 from orchestrator.spec.spec import Spec
-from orchestrator.storage.ledger import Ledger, PlayCounts
+from orchestrator.storage.ledger import Ledger
 from orchestrator.storage.store import CorruptArtifactError, Store
 from orchestrator.work.jobs import BlockTask
 from orchestrator.work.plan import Node, Plan
 from orchestrator.work.recipes import Recipe
-from stitching.methods.planning import PlanningSettings
 
 OTHER_SECONDS = 1.0  # of what nobody measured, such as data of the maze
 
@@ -37,34 +39,40 @@ class CostEstimate:
     seconds_training: float  # of one core
     seconds_evaluation: float
     disk_bytes: int
-    from_history: bool  # times measured on this store, not the reference
+    seconds_measured: float  # of both together, what rests on measurements in this store
 
 
 def estimate(plan: Plan, store: Store, shared: Ledger) -> CostEstimate:
     """Look at store and ledger; runs nothing.
 
-    How many episodes will survive to each block is what blocks like it have shown in this store;
-    where there were none, as many as usual in that benchmark.
+    What work like it has taken in this store, and how many episodes survived it, is expected again;
+    where there was none, what is counted from the settings, and as many survivors as usual in that
+    benchmark.
     """
     spec = plan.spec
     artifacts: dict[str, Counter[bool]] = {}
-    training = 0.0
-    trained = _training_history(store)
+    training = measured = model_bytes = 0.0
+    taken, likeness = _training_history(store), Likeness(plan.recipes)
     for key, recipe in plan.recipes.items():
         found = (recipe.kind, key) in store
         artifacts.setdefault(recipe.kind, Counter())[found] += 1
         if not found:
-            known = trained.get(_size_class(recipe))
-            training += _reference_seconds(recipe) if known is None else known
+            trained = training_of(recipe)
+            known = taken.get(likeness.of(key))
+            training += _counted_seconds(recipe, trained) if known is None else known
+            measured += known or 0.0
+            model_bytes += trained.bytes if trained else 0
 
-    history = shared.history()
+    expected = Expectations(plan, shared.history())
     blocks: dict[str, Counter[Standing]] = {}
     evaluation = missing_segments = 0.0
-    for place in standings(plan, shared, history):
+    for place in standings(plan, shared, expected):
         blocks.setdefault(place.node.method, Counter())[place.standing] += 1
         if place.standing == "missing":
             missing_segments += place.arriving
-            evaluation += place.arriving * seconds_each(place.task, history)
+            seconds = place.arriving * expected.seconds_each(place.node, place.chunk)
+            evaluation += seconds
+            measured += seconds if expected.measured(place.node, place.chunk) else 0.0
 
     runs = len(spec.methods) * spec.seeds * spec.episodes
     naive_segments = sum(len(task) for task in spec.all_tasks) * runs
@@ -84,8 +92,10 @@ def estimate(plan: Plan, store: Store, shared: Ledger) -> CostEstimate:
         seconds_training=training,
         seconds_evaluation=evaluation,
         segments_missing=round(missing_segments),
-        disk_bytes=round(2 * ENTRIES[spec.benchmark].costs.segment_bytes * missing_segments),
-        from_history=any(task.kind in history for task in plan.tasks.values()),
+        disk_bytes=round(
+            2 * ENTRIES[spec.benchmark].costs.segment_bytes * missing_segments + model_bytes
+        ),
+        seconds_measured=measured,
     )
 
 
@@ -94,14 +104,13 @@ class PlannedBlock:
     """A block of the tree, and what is known of it."""
 
     node: Node
+    chunk: int
     task: BlockTask
     standing: Standing
     arriving: float  # episodes expected to play it
 
 
-def standings(
-    plan: Plan, shared: Ledger, history: Mapping[str, PlayCounts]
-) -> Iterator[PlannedBlock]:
+def standings(plan: Plan, shared: Ledger, expected: Expectations) -> Iterator[PlannedBlock]:
     """Every block of a plan, and whether it is there, not needed, or to be played.
 
     A block is decided without being played where no episode survived a block above it. What lies
@@ -118,31 +127,17 @@ def standings(
                 outcome = next((outcome for _, outcome in shared.outcomes([task.key])), None)
                 standing = "missing" if outcome is None else "found"
                 below = "missing" if outcome is None else None if outcome.survivors else "decided"
-            yield PlannedBlock(node, task, standing, arriving)
-            surviving = arriving * _success_rate(task, history)
+            yield PlannedBlock(node, chunk, task, standing, arriving)
+            surviving = arriving * expected.success_rate(node, chunk)
             if standing == "found" and outcome is not None:
                 surviving = outcome.survivors
             waiting.extend((child, below, surviving) for child in plan.children.get(node, []))
 
 
-def _success_rate(task: BlockTask, history: Mapping[str, PlayCounts]) -> float:
-    known = history.get(task.kind)
-    return ENTRIES[task.benchmark].costs.success if known is None else known.success_rate
-
-
-def seconds_each(task: BlockTask, history: Mapping[str, PlayCounts]) -> float:
-    """What a segment of a block is expected to take a worker."""
-    if task.kind in history:
-        return history[task.kind].seconds_each
-    costs = ENTRIES[task.benchmark].costs
-    plans = isinstance(task.settings, PlanningSettings)
-    return costs.planned_segment if plans else costs.segment
-
-
-def _reference_seconds(recipe: Recipe) -> float:
-    costs, config = ENTRIES[recipe.params["benchmark"]].costs, recipe.params.get("config", {})
-    if recipe.kind in costs.update:
-        return costs.update[recipe.kind] * float(config["updates"])
+def _counted_seconds(recipe: Recipe, trained: Training | None) -> float:
+    if trained is not None:
+        return trained.seconds
+    costs = ENTRIES[recipe.params["benchmark"]].costs
     if recipe.kind in costs.demonstration:
         return costs.demonstration[recipe.kind] * _demonstrations(recipe)
     return costs.whole.get(recipe.kind, OTHER_SECONDS)
@@ -178,27 +173,23 @@ def _steps_in_tree(plan: Plan) -> int:
     )
 
 
-def _training_history(store: Store) -> dict[tuple[str, str], float]:
-    """Seconds that artifacts of a kind and size took before on this machine's store.
+def _training_history(store: Store) -> dict[str, float]:
+    """Seconds that artifacts took before on this machine's store, by their likeness.
 
     The longest, which is what to expect where other work runs beside it.
     """
-    seconds: dict[tuple[str, str], float] = {}
+    recipes: dict[str, Recipe] = {}
+    seconds: dict[str, float] = {}
     for kind, key in store.artifacts():
         try:
             made = store.manifest(kind, key)["made"]
         except CorruptArtifactError:
             continue
-        recipe = Recipe(made["kind"], made["params"], made["inputs"])
-        size = _size_class(recipe)
-        seconds[size] = max(made["seconds"], seconds.get(size, 0.0))
-    return seconds
-
-
-def _size_class(recipe: Recipe) -> tuple[str, str]:
-    config = recipe.params.get("config", {})
-    names = ("updates", "width", "members", "multi_task", "episodes", "held_out")
-    size = [config.get(name) for name in names]
-    if config.get("first_weights"):
-        size.append(_demonstrations(recipe))
-    return recipe.kind, str(size)
+        recipes[key] = Recipe(made["kind"], made["params"], made["inputs"])
+        seconds[key] = made["seconds"]
+    likeness = Likeness(recipes)
+    longest: dict[str, float] = {}
+    for key, taken in seconds.items():
+        alike = likeness.of(key)
+        longest[alike] = max(taken, longest.get(alike, 0.0))
+    return longest

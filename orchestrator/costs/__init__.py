@@ -1,0 +1,1 @@
+"""What work costs: counted from settings, or as this store has seen it."""
