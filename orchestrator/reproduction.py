@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
@@ -17,7 +16,6 @@ from orchestrator.cores import check_workers, usable_cores
 from orchestrator.errors import (
     BadDataError,
     IncompleteError,
-    SkillstitchError,
     UsageError,
 )
 from orchestrator.executors import ExecutorKind, open_executor
@@ -32,7 +30,8 @@ from orchestrator.storage.ledger import Ledger
 from orchestrator.storage.provenance import provenance
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.storage.store import USUAL_STORE, Artifact, Store, storage_errors
-from orchestrator.tracking.run import publish
+from orchestrator.tracking.live import Live
+from orchestrator.tracking.run import mark_killed, publish
 from orchestrator.work.building import Builds, verified_artifacts
 from orchestrator.work.evaluation import Evaluation
 from orchestrator.work.jobs import Job, Report
@@ -127,10 +126,14 @@ def tracked(
     uri = settings.resolved_tracking_uri()
     try:
         yield
-    except SkillstitchError:
-        publish(directory, uri, failed=True)
+        trouble = publish(directory, uri, "FINISHED")
+    except KeyboardInterrupt:
+        mark_killed(directory, uri)
         raise
-    if trouble := publish(directory, uri, finished=True):
+    except Exception:
+        publish(directory, uri, "FAILED")
+        raise
+    if trouble:
         progress.say(f"tracking: {trouble}")
     watch.lap("tracking")
 
@@ -194,27 +197,22 @@ def _work(
     shared = Ledger(settings.store / "blocks.sqlite")
     executor = LazyExecutor(settings)
     watch.lap("preparing")
-    announcement = None
-    try:
+    uri = settings.resolved_tracking_uri()
+    with closing(shared), closing(executor):
         if not present >= plan.needed:
             executor.open()
         watch.lap("starting workers")
-        announcement = _announce(directory, settings.resolved_tracking_uri())
-        builds = Builds(plan, store, ledger, executor, progress)
-        busy_training = builds.run(plan.needed, present)
-        watch.lap("training")
-        if note := undemonstrated_note(undemonstrated_skills(plan, store)):
-            progress.say(note)
-        evaluation = Evaluation(plan, store, ledger, shared, executor, progress)
-        evaluation.run()
-        watch.lap("evaluation")
-        _illustrate(builds, plan, present, progress)
-        watch.lap("illustrations")
-    finally:
-        executor.close()
-        if announcement is not None:
-            announcement.join()
-        shared.close()
+        with Live(lambda ending: publish(directory, uri, "RUNNING", ending)):
+            builds = Builds(plan, store, ledger, executor, progress)
+            busy_training = builds.run(plan.needed, present)
+            watch.lap("training")
+            if note := undemonstrated_note(undemonstrated_skills(plan, store)):
+                progress.say(note)
+            evaluation = Evaluation(plan, store, ledger, shared, executor, progress)
+            evaluation.run()
+            watch.lap("evaluation")
+            _illustrate(builds, plan, present, progress)
+            watch.lap("illustrations")
     watch.lap("stopping workers")
     return {
         "executor": settings.executor,
@@ -235,13 +233,3 @@ def _illustrate(builds: Builds, plan: Plan, present: set[str], progress: Progres
         builds.run(missing, present | plan.needed, phase="illustrations")
     except (BadDataError, IncompleteError) as error:
         progress.say(f"figures will be missing: {error}")
-
-
-def _announce(directory: RunDirectory, uri: str) -> threading.Thread:
-    """Show the run in MLflow as running, beside the work: importing MLflow alone takes seconds.
-
-    Its outcome does not matter: whatever is missed now, the last publication brings.
-    """
-    thread = threading.Thread(target=publish, args=(directory, uri), daemon=True)
-    thread.start()
-    return thread

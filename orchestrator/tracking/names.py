@@ -10,6 +10,11 @@ LONGEST_TEXT = 500  # of a param or tag: what every MLflow version takes
 LONGEST_KEY = 250
 
 
+def experiment_name(benchmark: str) -> str:
+    """The MLflow experiment that holds all runs and sweeps of a benchmark."""
+    return f"skillstitch/{benchmark}"
+
+
 def allowed_name(text: str) -> str:
     """MLflow takes letters, digits and "_-. :/" in names: "mic → lig" becomes "mic to lig"."""
     words = re.sub(r"[^\w\-. :/]", " ", text.replace("→", "to")).split()

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from analysis.schema import DATASETS, EPISODES, PROVENANCE, SPEC, TRAINING, RunSpec, leaves
 from orchestrator.tracking.metrics import Curves, finite, learning_curves, reported, seed_scores
 from orchestrator.tracking.names import allowed_name, short_text
-from orchestrator.tracking.receipt import Status, digest, published_files
+from orchestrator.tracking.receipt import Status, digest, published_files, read_json
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -48,7 +48,7 @@ def read_views(run_dir: Path, status: Status) -> list[RunView]:
     """The parent's view, then one for each (method, seed) that there is something to show of."""
     plain = json.loads((run_dir / SPEC).read_text())
     provenance = json.loads((run_dir / PROVENANCE).read_text())
-    training = _read_json(run_dir / TRAINING, [])
+    training = read_json(run_dir / TRAINING, [])
     spec = RunSpec.from_dict(plain)
     parent = RunView(
         name=f"{spec.name} {spec.scale}",
@@ -64,7 +64,7 @@ def read_views(run_dir: Path, status: Status) -> list[RunView]:
             *(reported(run_dir / "report", entry.id) for entry in spec.tables),
         ),
         curves={},
-        datasets=_read_json(run_dir / DATASETS, []),
+        datasets=read_json(run_dir / DATASETS, []),
         files={
             name: path
             for name, path in published_files(run_dir).items()
@@ -94,7 +94,7 @@ def _child(
     numbers = finite(*(seed_scores(episodes, alone, entry) for entry in spec.tables))
     return RunView(
         name=f"{method} seed {seed}",
-        status="FAILED" if parent.status == "FAILED" and not numbers else "FINISHED",
+        status="FINISHED" if numbers else parent.status,
         identity=(parent.identity[0], method, str(seed)),
         tags={name: value for name, value in parent.tags.items() if name != NOTE},
         params=parent.params | _overrides(method) | {"method": method, "seed": str(seed)},
@@ -129,7 +129,3 @@ def _read_episodes(run_dir: Path) -> pd.DataFrame:
 
     path = run_dir / EPISODES
     return pd.read_parquet(path) if path.is_file() else pd.DataFrame(columns=COLUMNS)
-
-
-def _read_json(path: Path, default: Any) -> Any:
-    return json.loads(path.read_text()) if path.is_file() else default

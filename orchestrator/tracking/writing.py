@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 import time
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from threading import Event
 from typing import TYPE_CHECKING, Any
 
 from analysis.schema import SPEC
@@ -27,10 +29,16 @@ class Publisher:
     """Brings the MLflow runs of one run directory to what they should be."""
 
     def __init__(
-        self, client: MlflowClient, experiment: str, files: Mapping[str, Path], run_id: str
+        self,
+        client: MlflowClient,
+        experiment: str,
+        files: Mapping[str, Path],
+        run_id: str,
+        ending: Event | None = None,  # once it is set, `write` breaks off
     ) -> None:
         self._client = client
         self._experiment = experiment
+        self._ending = ending or Event()
         self._deadline = time.monotonic() + PUBLISH_SECONDS
         self._began = int(files[SPEC].stat().st_mtime * 1000)
         self._ended = int(max(path.stat().st_mtime for path in files.values()) * 1000)
@@ -44,6 +52,7 @@ class Publisher:
         above = self._take(parent, {})
         self._fill(above, parent)
         for child in children:
+            self._check_time()
             run = self._take(child, {"mlflow.parentRunId": above.info.run_id})
             self._fill(run, child)
             self._settle(run, child.status)
@@ -102,8 +111,15 @@ class Publisher:
         self._client.delete_run(run.info.run_id)  # to MLflow's bin, from which it can be restored
 
     def _check_time(self) -> None:
-        if time.monotonic() > self._deadline:
-            raise TrackingError(f"it took more than {PUBLISH_SECONDS:.0f} s")
+        check_time(self._ending, self._deadline)
+
+
+def check_time(ending: Event, deadline: float = math.inf) -> None:
+    """Raises TrackingError when a publication is to break off."""
+    if ending.is_set():
+        raise TrackingError("the work ended meanwhile")
+    if time.monotonic() > deadline:
+        raise TrackingError(f"it took more than {PUBLISH_SECONDS:.0f} s")
 
 
 def _metrics(run: Run, view: RunView) -> list[Any]:

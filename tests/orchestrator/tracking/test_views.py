@@ -20,7 +20,7 @@ from tests.orchestrator.tracking.fake_run import (
 
 
 def test_a_finished_run_is_shown_whole(run_dir: Path, uri: str) -> None:
-    assert publish(run_dir, uri, finished=True) == PublishOutcome(ok=True)
+    assert publish(run_dir, uri, "FINISHED") == PublishOutcome(ok=True)
     seen = Seen(uri)
     assert seen.states() == ("FINISHED", {"FINISHED"})
     assert len(seen.children) == CHILDREN
@@ -51,7 +51,7 @@ def test_a_finished_run_is_shown_whole(run_dir: Path, uri: str) -> None:
 
 
 def test_children_show_their_own_scores_and_curves(run_dir: Path, uri: str) -> None:
-    publish(run_dir, uri, finished=True)
+    publish(run_dir, uri, "FINISHED")
     seen = Seen(uri)
     episodes = make_episodes()
     means = episodes[episodes["length"] == 2].groupby(["method", "seed"])["score"].mean()
@@ -77,18 +77,18 @@ def test_children_show_their_own_scores_and_curves(run_dir: Path, uri: str) -> N
 
 def test_the_life_of_a_run(tmp_path: Path, uri: str) -> None:
     run_dir = start_run(tmp_path / "run")
-    assert publish(run_dir, uri, finished=False).ok
+    assert publish(run_dir, uri, "RUNNING").ok
     begun = Seen(uri)
     assert begun.states() == ("RUNNING", set())
     assert begun.parent.data.metrics == {}
 
     train_run(run_dir)
-    assert publish(run_dir, uri, finished=False).ok
+    assert publish(run_dir, uri, "RUNNING").ok
     first = Seen(uri)
-    assert first.states() == ("RUNNING", {"FINISHED"})
+    assert first.states() == ("RUNNING", {"RUNNING"})
 
     finish_run(run_dir)
-    assert publish(run_dir, uri, finished=True).ok
+    assert publish(run_dir, uri, "FINISHED").ok
     last = Seen(uri)
     assert last.states() == ("FINISHED", {"FINISHED"})
     assert begun.parent.info.run_id == first.parent.info.run_id == last.parent.info.run_id
@@ -98,17 +98,17 @@ def test_the_life_of_a_run(tmp_path: Path, uri: str) -> None:
 
 def test_a_failed_run(tmp_path: Path, uri: str) -> None:
     run_dir = train_run(start_run(tmp_path / "run"))
-    assert publish(run_dir, uri, finished=False, failed=True).ok
+    assert publish(run_dir, uri, "FAILED").ok
     assert Seen(uri).states() == ("FAILED", {"FAILED"})
-    assert publish(run_dir, uri, finished=False).ok  # the same command again, which resumes
-    assert Seen(uri).states() == ("RUNNING", {"FINISHED"})
+    assert publish(run_dir, uri, "RUNNING").ok  # the same command again, which resumes
+    assert Seen(uri).states() == ("RUNNING", {"RUNNING"})
 
 
 def test_long_configurations_fit_into_params(tmp_path: Path, uri: str) -> None:
     run_dir = start_run(tmp_path / "run")
     long = {"notes": "x" * 9000, "many": {str(i): i for i in range(150)}}
     write_json(run_dir / "spec.json", make_spec() | {"spec": long})
-    assert publish(run_dir, uri, finished=False).ok
+    assert publish(run_dir, uri, "RUNNING").ok
     params = Seen(uri).parent.data.params
     assert len(params["notes"]) == LONGEST_TEXT
     assert params["many.149"] == "149"

@@ -12,6 +12,7 @@ import pytest
 
 from orchestrator.cli import TERMINATED
 from orchestrator.spec.spec import Spec
+from orchestrator.tracking.killing import SECONDS_TO_KILL
 from tests.orchestrator.executors.processes import descendants, title, titled
 from tests.orchestrator.launched import (
     artifacts_built,
@@ -46,6 +47,29 @@ def test_mlflow_shows_nothing_running_after_a_kill(place: Place, spec: Spec) -> 
     assert process.exitcode == 0
     assert place.directory.finished
     assert statuses(place) == ["FINISHED"] * (1 + len(spec.methods) * spec.seeds)
+
+
+@pytest.mark.slow
+def test_mlflow_shows_what_sigterm_ended_as_killed_until_it_goes_on(place: Place) -> None:
+    def shown_running(run: subprocess.Popen[bytes]) -> bool:
+        while run.poll() is None and "RUNNING" not in statuses(place):
+            time.sleep(0.01)
+        return "RUNNING" in statuses(place)
+
+    long = ("--executor", "serial", "--agent.updates", "12000", "--seeds", "1")
+    run = launch(place, *long)
+    assert shown_running(run)
+    ended = time.monotonic()
+    run.terminate()
+    assert run.wait(60) == TERMINATED
+    assert time.monotonic() - ended < 2 * SECONDS_TO_KILL
+    assert errors_of(place).read_text().splitlines()[-1] == "interrupted; the same command resumes"
+    assert set(statuses(place)) == {"KILLED"}
+
+    run = launch(place, *long)
+    assert shown_running(run)
+    assert run.wait(120) == 0
+    assert set(statuses(place)) == {"FINISHED"}
 
 
 @pytest.fixture
