@@ -21,6 +21,21 @@ def allowed_name(text: str) -> str:
     return " ".join(words).replace(" /", "/")[:LONGEST_KEY]
 
 
+def metric_name(text: str) -> str:
+    """The same without spaces: "table1/2 goals/mic → lig" becomes "table1/2_goals/mic_to_lig"."""
+    return allowed_name(text.replace(":", " ")).replace(" ", "_")
+
+
+def run_name(*parts: str) -> str:
+    """ "table1 · quick · 3f2a": parts that are empty are left out."""
+    return " · ".join(part for part in parts if part)
+
+
+def short_id(run_id: str) -> str:
+    """The part of a run's id that its MLflow runs are named by."""
+    return run_id[:4]
+
+
 def short_text(value: Any) -> str:
     """A value as text that MLflow takes, cut where it is too long."""
     text = value if isinstance(value, str) else json.dumps(value)

@@ -11,8 +11,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from analysis.schema import DATASETS, EPISODES, PROVENANCE, SPEC, TRAINING, RunSpec, leaves
-from orchestrator.tracking.metrics import Curves, finite, learning_curves, reported, seed_scores
-from orchestrator.tracking.names import allowed_name, short_text
+from orchestrator.tracking.changes import changed_fields, short_changes
+from orchestrator.tracking.metrics import (
+    Curves,
+    finite,
+    learning_curves,
+    mean_score,
+    reported,
+    seed_scores,
+)
+from orchestrator.tracking.names import allowed_name, run_name, short_id, short_text
 from orchestrator.tracking.receipt import Status, digest, published_files, read_json
 
 if TYPE_CHECKING:
@@ -51,7 +59,12 @@ def read_views(run_dir: Path, status: Status) -> list[RunView]:
     training = read_json(run_dir / TRAINING, [])
     spec = RunSpec.from_dict(plain)
     parent = RunView(
-        name=f"{spec.name} {spec.scale}",
+        name=run_name(
+            spec.name,
+            spec.scale,
+            short_changes(changed_fields(plain["spec"])),
+            short_id(provenance["run_id"]),
+        ),
         status=status,
         identity=(provenance["run_id"], "", ""),
         tags=_tags(spec, provenance) | {NOTE: spec.title, "skillstitch.run_dir": str(run_dir)},
@@ -91,15 +104,18 @@ def _child(
 ) -> RunView:
     """One method under one seed, its metrics named as all others' so that they can be compared."""
     alone = replace(spec, methods={method: spec.methods[method]}, seeds=(seed,))
-    numbers = finite(*(seed_scores(episodes, alone, entry) for entry in spec.tables))
+    numbers = finite(
+        mean_score(episodes), *(seed_scores(episodes, alone, entry) for entry in spec.tables)
+    )
     return RunView(
-        name=f"{method} seed {seed}",
+        name=run_name(method, f"seed {seed}", short_id(parent.identity[0])),
         status="FINISHED" if numbers else parent.status,
         identity=(parent.identity[0], method, str(seed)),
         tags={name: value for name, value in parent.tags.items() if name != NOTE},
         params=parent.params | _overrides(method) | {"method": method, "seed": str(seed)},
         numbers=numbers,
         curves=learning_curves(method, spec.models.get(method), seed, training),
+        datasets=parent.datasets,
     )
 
 

@@ -45,8 +45,8 @@ def test_changed_scores_replace_the_old_ones(run_dir: Path, uri: str) -> None:
     report(run_dir, make_episodes().assign(accomplished=0, score=0.0))
     assert publish(run_dir, uri, "FINISHED").ok
     seen = Seen(uri)
-    assert seen.parent.data.metrics["table1/2 goals/no-stitch/score"] == 0
-    assert seen.children["no-stitch", 0].data.metrics["table1/2 goals/score"] == 0
+    assert seen.parent.data.metrics["table1/2_goals/no-stitch/score"] == 0
+    assert seen.children["no-stitch", 0].data.metrics["table1/2_goals/score"] == 0
     curve = seen.client.get_metric_history(
         seen.children["no-stitch", 0].info.run_id, "agent/value_loss"
     )

@@ -56,7 +56,7 @@ def test_mlflow_shows_what_sigterm_ended_as_killed_until_it_goes_on(place: Place
             time.sleep(0.01)
         return "RUNNING" in statuses(place)
 
-    long = ("--executor", "serial", "--agent.updates", "12000", "--seeds", "1")
+    long = ("--executor", "serial", "--agent.updates", "6000", "--seeds", "1")
     run = launch(place, *long)
     assert shown_running(run)
     ended = time.monotonic()
