@@ -126,7 +126,8 @@ def tracked(
     uri = settings.resolved_tracking_uri()
     try:
         yield
-        trouble = publish(directory, uri, "FINISHED")
+        with progress.step("tracking"):
+            trouble = publish(directory, uri, "FINISHED")
     except KeyboardInterrupt:
         mark_killed(directory, uri)
         raise
@@ -159,7 +160,8 @@ def _carry_out(
     plan = make_plan(spec)
     store = Store(settings.store)
     with closing(directory.ledger()) as ledger:
-        present = verified_artifacts(plan, store, ledger, progress)
+        with progress.step("checking what is there"):
+            present = verified_artifacts(plan, store, ledger, progress)
         if directory.played and present >= plan.needed:
             if directory.finished:
                 return False
@@ -168,7 +170,7 @@ def _carry_out(
             facts: Plain = {"run_id": run_id}
             directory.write_json(PROVENANCE, provenance() | facts)
             facts |= _work(plan, settings, directory, store, ledger, present, progress, watch)
-            with storage_errors(directory.path):
+            with storage_errors(directory.path), progress.step("writing"):
                 counts = write_readable(plan, store, ledger, directory)
                 episodes = write_episodes(directory.path)
                 counts["episodes"] = len(episodes)
@@ -176,7 +178,7 @@ def _carry_out(
                 watch.lap("writing")
                 facts |= {"seconds": watch.rounded(), "counts": counts}
                 directory.write_json(PROVENANCE, provenance() | facts)
-    with storage_errors(directory.path):
+    with storage_errors(directory.path), progress.step("report"):
         build_report(directory.path)
     directory.mark(finished=True)
     watch.lap("report")
@@ -200,7 +202,8 @@ def _work(
     uri = settings.resolved_tracking_uri()
     with closing(shared), closing(executor):
         if not present >= plan.needed:
-            executor.open()
+            with progress.step("starting workers"):
+                executor.open()
         watch.lap("starting workers")
         with Live(lambda ending: publish(directory, uri, "RUNNING", ending)):
             builds = Builds(plan, store, ledger, executor, progress)

@@ -124,6 +124,7 @@ class News:
     done: int  # updates, of all its trainings that have begun
     updates: int
     losses: dict[str, float]  # recorded last, of the one that is under way
+    trainings: int = 1  # that have begun
 
 
 def news_of(folder: Path, since: float = 0.0) -> News | None:
@@ -141,7 +142,7 @@ def news_of(folder: Path, since: float = 0.0) -> News | None:
         return None
     _, newest = max(told, key=lambda news: news[0])
     done, updates = (sum(news[name] for _, news in told) for name in ("done", "updates"))
-    return News(done, updates, newest["losses"])
+    return News(done, updates, newest["losses"], len(told))
 
 
 def _digest(data: bytes) -> bytes:

@@ -49,13 +49,12 @@ def estimate(plan: Plan, store: Store, shared: Ledger) -> CostEstimate:
     spec = plan.spec
     artifacts: dict[str, Counter[bool]] = {}
     training = 0.0
-    trained = _training_history(store)
+    seconds = training_seconds(plan.recipes, store)
     for key, recipe in plan.recipes.items():
         found = (recipe.kind, key) in store
         artifacts.setdefault(recipe.kind, Counter())[found] += 1
         if not found:
-            known = trained.get(_size_class(recipe))
-            training += _reference_seconds(recipe) if known is None else known
+            training += seconds[key]
 
     history = shared.history()
     blocks: dict[str, Counter[Standing]] = {}
@@ -87,6 +86,18 @@ def estimate(plan: Plan, store: Store, shared: Ledger) -> CostEstimate:
         disk_bytes=round(2 * ENTRIES[spec.benchmark].costs.segment_bytes * missing_segments),
         from_history=any(task.kind in history for task in plan.tasks.values()),
     )
+
+
+def training_seconds(recipes: Mapping[str, Recipe], store: Store) -> dict[str, float]:
+    """What each artifact is expected to take a worker, by key.
+
+    As long as one of its kind and size took in this store, or else the reference.
+    """
+    known = _training_history(store)
+    return {
+        key: known.get(_size_class(recipe), _reference_seconds(recipe))
+        for key, recipe in recipes.items()
+    }
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from typing import Any
 
 from orchestrator.spec.spec import Spec, load_spec, plain_spec
 from orchestrator.spec.structure import Plain
@@ -21,7 +22,7 @@ def test_what_is_as_packaged_has_no_changes() -> None:
 
 
 def test_a_changed_field_is_told_in_short() -> None:
-    spec = load_spec("table1", "quick")
+    spec: Any = load_spec("table1", "quick")
     stronger = replace(spec, mb_stitch=replace(spec.mb_stitch, alpha=5.0))
     assert changed_fields(asked(stronger)) == {"mb_stitch.alpha": 5.0}
     assert short_changes(changed_fields(asked(stronger))) == "α 5"
