@@ -30,7 +30,7 @@ from orchestrator.storage.ledger import Ledger
 from orchestrator.storage.provenance import provenance
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.storage.store import USUAL_STORE, Artifact, Store, storage_errors
-from orchestrator.tracking.live import Live
+from orchestrator.tracking.live import Growing, Live
 from orchestrator.tracking.run import mark_killed, publish
 from orchestrator.work.building import Builds, verified_artifacts
 from orchestrator.work.evaluation import Evaluation
@@ -38,6 +38,7 @@ from orchestrator.work.jobs import Job, Report
 from orchestrator.work.plan import Plan, make_plan
 from orchestrator.work.progress import Progress
 from orchestrator.work.stopwatch import Stopwatch
+from orchestrator.work.trainings import GrowingCurves
 
 MOST_ON_A_CORE = 8  # workers: each holds a copy of torch and of a simulator
 
@@ -205,7 +206,8 @@ def _work(
             with progress.step("starting workers"):
                 executor.open()
         watch.lap("starting workers")
-        with Live(lambda ending: publish(directory, uri, "RUNNING", ending)):
+        growing = Growing(GrowingCurves(plan, store).entries)
+        with Live(lambda ending: publish(directory, uri, "RUNNING", ending, growing)):
             builds = Builds(plan, store, ledger, executor, progress)
             busy_training = builds.run(plan.needed, present)
             watch.lap("training")

@@ -7,16 +7,23 @@ from threading import Event
 from orchestrator import tracking
 from orchestrator.errors import LockedError
 from orchestrator.storage.rundir import RunDirectory
+from orchestrator.tracking.live import Growing
 from orchestrator.tracking.receipt import Status, read_receipt
 
 NO_TRACKING = "none"
 
 
-def publish(directory: RunDirectory, uri: str, status: Status, ending: Event | None = None) -> str:
+def publish(
+    directory: RunDirectory,
+    uri: str,
+    status: Status,
+    ending: Event | None = None,
+    growing: Growing | None = None,
+) -> str:
     """Bring MLflow's view of a run up to date; returns what went wrong, "" if nothing did."""
     if uri == NO_TRACKING:
         return ""
-    outcome = tracking.publish(directory.path, uri, status, ending)
+    outcome = tracking.publish(directory.path, uri, status, ending, growing)
     return "" if outcome.ok else f"{outcome.error}; the next command publishes what was missed"
 
 

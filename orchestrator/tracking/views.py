@@ -52,11 +52,16 @@ class RunView:
         return hashlib.sha256(f"{json.dumps(plain)}{digest(self.files)}".encode()).hexdigest()
 
 
-def read_views(run_dir: Path, status: Status) -> list[RunView]:
-    """The parent's view, then one for each (method, seed) that there is something to show of."""
+def read_views(
+    run_dir: Path, status: Status, training: list[dict[str, Any]] | None = None
+) -> list[RunView]:
+    """The parent's view, then one for each (method, seed) that there is something to show of.
+
+    training: in place of `training.json`.
+    """
     plain = json.loads((run_dir / SPEC).read_text())
     provenance = json.loads((run_dir / PROVENANCE).read_text())
-    training = read_json(run_dir / TRAINING, [])
+    training = read_json(run_dir / TRAINING, []) if training is None else training
     spec = RunSpec.from_dict(plain)
     parent = RunView(
         name=run_name(

@@ -1,18 +1,24 @@
-"""What is known of trainings while they go on: how far they are, and how far the whole is."""
+"""What is known of trainings while they go on: how far they are, how far the whole is, losses."""
 
 from __future__ import annotations
 
+import json
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from orchestrator.spec.structure import Plain
 from orchestrator.storage.store import Store
-from orchestrator.work.checkpoints import News, news_of
+from orchestrator.work.checkpoints import News, curves_of, news_of
 from orchestrator.work.costs import training_seconds
+from orchestrator.work.plan import Plan
 from orchestrator.work.progress import UnderWay
 from orchestrator.work.recipes import Recipe
 from stitching.data.mixtures import skill_pairs
+from stitching.models.training import Curves
+from stitching.streams import Label
 
 
 @dataclass
@@ -64,3 +70,52 @@ class Trainings:
             self._before[key] = now, news.done
         losses = [f"{name} {value:.3g}" for name, value in news.losses.items()]
         return ", ".join([line, *losses[:1]])
+
+
+@dataclass
+class GrowingCurves:
+    """Learning curves of a plan's models as `training.json` will have them, as far as they go."""
+
+    plan: Plan
+    store: Store
+    _since: float = field(default_factory=time.time)
+    _finished: dict[str, Curves] = field(default_factory=dict)  # by key
+
+    def entries(self) -> list[Plain]:
+        """One for each model, whether there is a curve already or not."""
+        return [
+            {
+                "kind": recipe.kind,
+                "seed": recipe.params["seed"],
+                "key": key,
+                "curves": self._curves(recipe),
+            }
+            for key, recipe in self.plan.recipes.items()
+            if key in self.plan.needed and "seed" in recipe.params
+        ]
+
+    def _curves(self, recipe: Recipe) -> Curves:
+        kind, key = recipe.kind, recipe.key
+        if key not in self._finished and (kind, key) in self.store:
+            with suppress(OSError, ValueError):  # it is being replaced
+                info = json.loads((self.store.path(kind, key) / "info.json").read_text())
+                self._finished[key] = info.get("curves", {})
+        if key in self._finished:
+            return self._finished[key]
+        curves: Curves = {}
+        for labels, own in curves_of(self.store.checkpoint_folder(key), self._since):
+            curves |= _as_in_the_artifact(recipe, labels[len(OWN_LABELS) :], own)
+        return curves
+
+
+OWN_LABELS = ("kind", "benchmark", "root_seed", "seed")
+"""Labels of a training that is an artifact's only one; of several, each has one more."""
+
+
+def _as_in_the_artifact(recipe: Recipe, more: Sequence[Label], own: Curves) -> Curves:
+    """The curves of one training by their names in its artifact; none where these are means."""
+    if not more:
+        return own
+    if recipe.kind != "agent":
+        return {}
+    return {f"{name} of skill {more[0]}": curve for name, curve in own.items()}
