@@ -92,15 +92,19 @@ class Publisher:
         new_params = view.params.items() - run.data.params.items()
         new_tags = view.tags.items() - run.data.tags.items()
         for params in _batches([Param(*item) for item in sorted(new_params)], BATCH):
+            self._check_time()
             self._client.log_batch(run_id, params=params)
         if view.datasets:
+            self._check_time()
             self._client.log_inputs(run_id, datasets=[_dataset(entry) for entry in view.datasets])
         for name, path in view.files.items():
             self._check_time()
             folder = Path(name).parent.as_posix()
             self._client.log_artifact(run_id, str(path), None if folder == "." else folder)
         for tags in _batches([RunTag(*item) for item in sorted(new_tags)], BATCH):
+            self._check_time()
             self._client.log_batch(run_id, tags=tags)
+        self._check_time()
         self._client.set_tag(run_id, CONTENT, content)
 
     def _settle(self, run: Run, status: str) -> None:

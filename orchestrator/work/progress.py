@@ -24,6 +24,8 @@ from rich.progress import Progress as RichBar
 SECONDS_BETWEEN_LINES = 10.0
 SECONDS_BETWEEN_LOOKS = 3.0  # so there is a line every 13 s, whatever goes on
 
+WHOLE = 1_000_000  # of a bar
+
 
 @dataclass(frozen=True)
 class UnderWay:
@@ -150,9 +152,9 @@ class ConsoleProgress:
 
     def phase(self, name: str, total: int, done: int) -> None:
         now = time.monotonic()
-        task = self._bar.add_task(name, total=1.0, count="", told="")
+        task = self._bar.add_task(name, total=WHOLE, count="", told="")
         self._phase = phase = _Phase(name, total, done, now, task)
-        self._bar.reset(task, completed=phase.share, count=phase.count, told="")
+        self._bar.reset(task, completed=round(WHOLE * phase.share), count=phase.count, told="")
         if not self._console.is_terminal:
             self._spoke = now
             self.say(f"{name}: {done} of {total} already there")
@@ -175,7 +177,7 @@ class ConsoleProgress:
         self._see(phase)
         phase.first_seen = time.monotonic(), phase.share
         # What was there already says nothing about how fast this goes.
-        self._bar.reset(phase.task, completed=phase.share)
+        self._bar.reset(phase.task, completed=round(WHOLE * phase.share))
         try:
             yield
         finally:
@@ -210,7 +212,9 @@ class ConsoleProgress:
 
     def _draw(self, phase: _Phase) -> None:
         told = phase.under_way.told
-        self._bar.update(phase.task, completed=phase.share, count=phase.count, told=told)
+        self._bar.update(
+            phase.task, completed=round(WHOLE * phase.share), count=phase.count, told=told
+        )
 
     def _tell(self, *, now: bool = False) -> None:
         """A line, unless there was one just before, or a bar shows the same."""
