@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
@@ -17,7 +16,6 @@ from orchestrator.cores import check_workers
 from orchestrator.errors import (
     BadDataError,
     IncompleteError,
-    SkillstitchError,
 )
 from orchestrator.executors import ExecutorKind, open_executor
 from orchestrator.executors.protocol import Executor
@@ -31,13 +29,15 @@ from orchestrator.storage.ledger import Ledger
 from orchestrator.storage.provenance import provenance
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.storage.store import USUAL_STORE, Artifact, Store, storage_errors
-from orchestrator.tracking.run import publish
+from orchestrator.tracking.live import Growing, Live
+from orchestrator.tracking.run import mark_killed, publish
 from orchestrator.work.building import Builds, verified_artifacts
 from orchestrator.work.evaluation import Evaluation
 from orchestrator.work.jobs import Job, Report
 from orchestrator.work.plan import Plan, make_plan
 from orchestrator.work.progress import Progress
 from orchestrator.work.stopwatch import Stopwatch
+from orchestrator.work.trainings import GrowingCurves
 
 
 @dataclass(frozen=True)
@@ -117,10 +117,15 @@ def tracked(
     uri = settings.resolved_tracking_uri()
     try:
         yield
-    except SkillstitchError:
-        publish(directory, uri, failed=True)
+        with progress.step("tracking"):
+            trouble = publish(directory, uri, "FINISHED")
+    except KeyboardInterrupt:
+        mark_killed(directory, uri)
         raise
-    if trouble := publish(directory, uri, finished=True):
+    except Exception:
+        publish(directory, uri, "FAILED")
+        raise
+    if trouble:
         progress.say(f"tracking: {trouble}")
     watch.lap("tracking")
 
@@ -146,7 +151,8 @@ def _carry_out(
     plan = make_plan(spec)
     store = Store(settings.store)
     with closing(directory.ledger()) as ledger:
-        present = verified_artifacts(plan, store, ledger, progress)
+        with progress.step("checking what is there"):
+            present = verified_artifacts(plan, store, ledger, progress)
         if directory.played and present >= plan.needed:
             if directory.finished:
                 return False
@@ -155,7 +161,7 @@ def _carry_out(
             facts: Plain = {"run_id": run_id}
             directory.write_json(PROVENANCE, provenance() | facts)
             facts |= _work(plan, settings, directory, store, ledger, present, progress, watch)
-            with storage_errors(directory.path):
+            with storage_errors(directory.path), progress.step("writing"):
                 counts = write_readable(plan, store, ledger, directory)
                 episodes = write_episodes(directory.path)
                 counts["episodes"] = len(episodes)
@@ -163,7 +169,7 @@ def _carry_out(
                 watch.lap("writing")
                 facts |= {"seconds": watch.rounded(), "counts": counts}
                 directory.write_json(PROVENANCE, provenance() | facts)
-    with storage_errors(directory.path):
+    with storage_errors(directory.path), progress.step("report"):
         build_report(directory.path)
     directory.mark(finished=True)
     watch.lap("report")
@@ -184,27 +190,24 @@ def _work(
     shared = Ledger(settings.store / "blocks.sqlite")
     executor = LazyExecutor(settings)
     watch.lap("preparing")
-    announcement = None
-    try:
+    uri = settings.resolved_tracking_uri()
+    with closing(shared), closing(executor):
         if not present >= plan.needed:
-            executor.open()
+            with progress.step("starting workers"):
+                executor.open()
         watch.lap("starting workers")
-        announcement = _announce(directory, settings.resolved_tracking_uri())
-        builds = Builds(plan, store, ledger, executor, progress)
-        busy_training = builds.run(plan.needed, present)
-        watch.lap("training")
-        if note := undemonstrated_note(undemonstrated_skills(plan, store)):
-            progress.say(note)
-        evaluation = Evaluation(plan, store, ledger, shared, executor, progress)
-        evaluation.run()
-        watch.lap("evaluation")
-        _illustrate(builds, plan, present, progress)
-        watch.lap("illustrations")
-    finally:
-        executor.close()
-        if announcement is not None:
-            announcement.join()
-        shared.close()
+        growing = Growing(GrowingCurves(plan, store).entries)
+        with Live(lambda ending: publish(directory, uri, "RUNNING", ending, growing)):
+            builds = Builds(plan, store, ledger, executor, progress)
+            busy_training = builds.run(plan.needed, present)
+            watch.lap("training")
+            if note := undemonstrated_note(undemonstrated_skills(plan, store)):
+                progress.say(note)
+            evaluation = Evaluation(plan, store, ledger, shared, executor, progress)
+            evaluation.run()
+            watch.lap("evaluation")
+            _illustrate(builds, plan, present, progress)
+            watch.lap("illustrations")
     watch.lap("stopping workers")
     return {
         "executor": settings.executor,
@@ -225,13 +228,3 @@ def _illustrate(builds: Builds, plan: Plan, present: set[str], progress: Progres
         builds.run(missing, present | plan.needed, phase="illustrations")
     except (BadDataError, IncompleteError) as error:
         progress.say(f"figures will be missing: {error}")
-
-
-def _announce(directory: RunDirectory, uri: str) -> threading.Thread:
-    """Show the run in MLflow as running, beside the work: importing MLflow alone takes seconds.
-
-    Its outcome does not matter: whatever is missed now, the last publication brings.
-    """
-    thread = threading.Thread(target=publish, args=(directory, uri), daemon=True)
-    thread.start()
-    return thread

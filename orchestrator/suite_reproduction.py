@@ -55,7 +55,7 @@ def reproduce_suite(suite: Suite, settings: Settings, progress: Progress) -> Run
         with tracked(directory, settings, progress, watch):
             gave_up = _carry_out_parts(suite, settings, parts, progress, watch)
             if not done:
-                with storage_errors(directory.path):
+                with storage_errors(directory.path), progress.step("report of all parts"):
                     write_merged(suite, directory, run_id)
                     build_report(directory.path)
                 directory.mark(finished=True)
@@ -76,7 +76,7 @@ def _carry_out_parts(
 ) -> list[str]:
     """Every part in turn; returns the labels of those that gave up blocks."""
     partial = []
-    with _workers_kept(settings, all(part.played for part in parts.values())):
+    with _workers_kept(settings, all(part.played for part in parts.values()), progress):
         for number, part in enumerate(suite.parts, start=1):
             directory = parts[part.label]
             progress.say(f"part {part.label} ({number} of {len(suite.parts)}): {directory.path}")
@@ -92,12 +92,13 @@ def _carry_out_parts(
 
 
 @contextmanager
-def _workers_kept(settings: Settings, nothing_to_do: bool) -> Iterator[None]:
+def _workers_kept(settings: Settings, nothing_to_do: bool, progress: Progress) -> Iterator[None]:
     """Ray is started once for all parts: executors opened meanwhile join it."""
     if settings.executor == "serial" or nothing_to_do:
         yield
         return
-    executor = open_executor(settings.executor, settings.workers, settings.address)
+    with progress.step("starting workers"):
+        executor = open_executor(settings.executor, settings.workers, settings.address)
     try:
         yield
     finally:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 from analysis.schema import PROVENANCE
@@ -67,30 +69,26 @@ def carry_out(
         earlier = directory.read_json("counts.json") or {}
         player = SpecPlayer(settings.store, ledger, LazyExecutor(settings), progress)
         tracker = Tracker(settings.resolved_tracking_uri(), directory, run_id, progress)
-        finished = False
-        try:
-            with storage_errors(directory.path):
-                if sweep.question.shared:  # else every trial has its own models, as it comes
-                    player.prepare([search_spec(sweep)])
+        with (
+            tracker.told(),
+            closing(ledger),
+            _counted(directory, player, earlier),
+            storage_errors(directory.path),
+        ):
+            if sweep.question.shared:  # else every trial has its own models, as it comes
+                player.prepare([search_spec(sweep)])
+            with player.quietly():
+                for _ in run_search(sweep, study, player, progress):
+                    _write_results(directory, study, player.executor, earlier)
+            _write_results(directory, study, player.executor, earlier)
+            directory.write_json("confirm.json", confirm(sweep, study, player))
+            directory.write_json("winner.json", winner(directory, study))
+            directory.write_json(PROVENANCE, provenance() | {"run_id": run_id})
+            if sweep.tables:
                 with player.quietly():
-                    for _ in run_search(sweep, study, player, progress):
-                        _write_results(directory, study, player.executor, earlier)
-                        tracker.publish("RUNNING", patient=True)
-                _write_results(directory, study, player.executor, earlier)
-                directory.write_json("confirm.json", confirm(sweep, study, player))
-                directory.write_json("winner.json", winner(directory, study))
-                directory.write_json(PROVENANCE, provenance() | {"run_id": run_id})
-                if sweep.tables:
-                    with player.quietly():
-                        write_table(sweep, player, directory.path / "table")
-                _write_counts(directory, player.executor, earlier)
-                write_report(sweep, study, directory, results, force=force)
-            finished = True
-        finally:
+                    write_table(sweep, player, directory.path / "table")
             _write_counts(directory, player.executor, earlier)
-            player.close()
-            ledger.close()
-            tracker.publish("FINISHED" if finished else "FAILED")
+            write_report(sweep, study, directory, results, force=force)
     return directory
 
 
@@ -163,6 +161,16 @@ def _write_trials(directory: RunDirectory, study: SweepStudy) -> None:
         for trial in study.finished
     ]
     directory.write_json("trials.json", trials)
+
+
+@contextmanager
+def _counted(directory: RunDirectory, player: SpecPlayer, earlier: Plain) -> Iterator[None]:
+    """However the work within it ends, what it did is counted, and the player closed."""
+    try:
+        yield
+    finally:
+        _write_counts(directory, player.executor, earlier)
+        player.close()
 
 
 def _write_counts(directory: RunDirectory, executor: CountingExecutor, earlier: Plain) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -52,15 +52,14 @@ def estimate(plan: Plan, store: Store, shared: Ledger) -> CostEstimate:
     spec = plan.spec
     artifacts: dict[str, Counter[bool]] = {}
     training = measured = model_bytes = 0.0
-    taken, likeness = _training_history(store), Likeness(plan.recipes)
+    taken = _training_seconds(plan.recipes, store)
     for key, recipe in plan.recipes.items():
         found = (recipe.kind, key) in store
         artifacts.setdefault(recipe.kind, Counter())[found] += 1
         if not found:
+            training += taken[key].seconds
+            measured += taken[key].seconds if taken[key].measured else 0.0
             trained = training_of(recipe)
-            known = taken.get(likeness.of(key))
-            training += _counted_seconds(recipe, trained) if known is None else known
-            measured += known or 0.0
             model_bytes += trained.bytes if trained else 0
 
     expected = Expectations(plan, shared.history())
@@ -97,6 +96,28 @@ def estimate(plan: Plan, store: Store, shared: Ledger) -> CostEstimate:
         ),
         seconds_measured=measured,
     )
+
+
+@dataclass(frozen=True)
+class _Expected:
+    seconds: float  # of one core
+    measured: bool  # in this store, by work like it; else counted from the settings
+
+
+def _training_seconds(recipes: Mapping[str, Recipe], store: Store) -> dict[str, _Expected]:
+    """What each artifact is expected to take, by key."""
+    taken, likeness = _training_history(store), Likeness(recipes)
+    expected = {}
+    for key, recipe in recipes.items():
+        known = taken.get(likeness.of(key))
+        counted = _counted_seconds(recipe, training_of(recipe)) if known is None else known
+        expected[key] = _Expected(counted, known is not None)
+    return expected
+
+
+def training_seconds(recipes: Mapping[str, Recipe], store: Store) -> dict[str, float]:
+    """Seconds of one core that each artifact is expected to take, by key."""
+    return {key: one.seconds for key, one in _training_seconds(recipes, store).items()}
 
 
 @dataclass(frozen=True)

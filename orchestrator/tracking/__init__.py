@@ -5,7 +5,9 @@ that publishing is idempotent: whatever a kill left half done, the next publish 
 MLflow is imported inside functions, because that takes seconds and most commands need none of it.
 """
 
+from orchestrator.tracking.killing import mark_killed
+from orchestrator.tracking.live import Live
 from orchestrator.tracking.publishing import PublishOutcome, publish
 from orchestrator.tracking.stores import default_uri
 
-__all__ = ["PublishOutcome", "default_uri", "publish"]
+__all__ = ["Live", "PublishOutcome", "default_uri", "mark_killed", "publish"]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from analysis.schema import VARIANT
-from orchestrator.tracking.names import allowed_name
+from orchestrator.tracking.names import metric_name
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -58,6 +58,12 @@ def seed_scores(episodes: pd.DataFrame, spec: RunSpec, entry: TableEntry) -> dic
     return metrics
 
 
+def mean_score(episodes: pd.DataFrame) -> dict[str, float]:
+    """One number by which any two runs can be sorted: the mean over all tasks, of every length."""
+    by_task = episodes.groupby("task")["score"].mean()
+    return {"score": by_task.mean()} if len(by_task) else {}
+
+
 def learning_curves(
     method: str, kinds: Collection[str] | None, seed: int, training: list[dict[str, Any]]
 ) -> Curves:
@@ -80,14 +86,14 @@ def learning_curves(
         head = f"{kind} {entry['key'][:8]}" if kind in several else kind
         for name, points in entry["curves"].items():
             kept = [(step, value) for step, value in points if math.isfinite(value)]
-            curves[allowed_name(f"{head}/{name}")] = kept
+            curves[metric_name(f"{head}/{name}")] = kept
     return curves
 
 
 def finite(*parts: Mapping[str, Any]) -> dict[str, float]:
     """Metrics under names that MLflow takes; cells without an episode (NaN) have none."""
     return {
-        allowed_name(name): float(value)
+        metric_name(name): float(value)
         for part in parts
         for name, value in part.items()
         if not isinstance(value, str | list | None) and math.isfinite(value)

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from threading import Event
 
 from analysis.schema import PROVENANCE
+from orchestrator.tracking.live import Growing
+from orchestrator.tracking.names import experiment_name
 from orchestrator.tracking.receipt import (
     Receipt,
     Status,
@@ -22,7 +25,7 @@ from orchestrator.tracking.stores import (
     without_password,
 )
 from orchestrator.tracking.views import read_views
-from orchestrator.tracking.writing import Publisher
+from orchestrator.tracking.writing import Publisher, check_time
 
 
 @dataclass(frozen=True)
@@ -34,36 +37,53 @@ class PublishOutcome:
     skipped: bool = False  # everything was there already
 
 
-def publish(run_dir: Path, uri: str, *, finished: bool, failed: bool = False) -> PublishOutcome:
+def publish(
+    run_dir: Path,
+    uri: str,
+    status: Status,
+    ending: Event | None = None,
+    growing: Growing | None = None,
+) -> PublishOutcome:
     """Make MLflow show what the run directory holds; cheap if it already does.
 
-    The parent run is RUNNING until `finished` or `failed`; children always end terminated.
+    The parent run gets the status, and so do children without a score; others are FINISHED.
+    ending: once it is set, the publication breaks off. growing: learning curves, before they are in
+    the directory.
     """
-    status: Status = "FAILED" if failed else "FINISHED" if finished else "RUNNING"
     try:
-        return _publish(run_dir, uri, status)
+        return _publish(run_dir, uri, status, ending or Event(), growing)
     except Exception as error:
         return PublishOutcome(ok=False, error=_one_line(error, uri))
 
 
-def _publish(run_dir: Path, uri: str, status: Status) -> PublishOutcome:
+def _publish(
+    run_dir: Path, uri: str, status: Status, ending: Event, growing: Growing | None
+) -> PublishOutcome:
     if not (run_dir / PROVENANCE).is_file():  # the work has not begun: nothing to show
         return PublishOutcome(ok=True, skipped=True)
     wanted = Receipt(without_password(uri), news(run_dir), status)
     # Results that were complete stay so, whatever became of a later command that added nothing.
     settled = (wanted, replace(wanted, status="FINISHED"))
-    if read_receipt(run_dir) in settled and not is_gone(uri):
+    training = growing.read() if growing else None
+    nothing_grew = growing is None or training == growing.published
+    if nothing_grew and read_receipt(run_dir) in settled and not is_gone(uri):
         return PublishOutcome(ok=True, skipped=True)
     write_receipt(run_dir, replace(wanted, published=""))
-    parent, *children = read_views(run_dir, status)
+    parent, *children = read_views(run_dir, status, training)
     with turn_to_write(uri):
         client = connect(uri)
+        check_time(ending)
         experiment = open_experiment(
-            client, uri, f"skillstitch/{parent.tags['skillstitch.benchmark']}"
+            client, uri, experiment_name(parent.tags["skillstitch.benchmark"])
         )
         files = published_files(run_dir)
-        Publisher(client, experiment, files, parent.identity[0]).write(parent, children)
+        points = growing.points if growing else None
+        publisher = Publisher(client, experiment, files, parent.identity[0], ending, points)
+        publisher.write(parent, children)
+        check_time(ending)
     write_receipt(run_dir, wanted)
+    if growing:
+        growing.published = training
     return PublishOutcome(ok=True)
 
 

@@ -7,12 +7,12 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from analysis.schema import DATASETS, EPISODES, PROVENANCE, SPEC, TRAINING
 from orchestrator.storage.store import write_atomically
 
-Status = Literal["RUNNING", "FINISHED", "FAILED"]
+Status = Literal["RUNNING", "FINISHED", "FAILED", "KILLED"]
 
 DATED = (PROVENANCE, "report/index.html")
 """Files that tell when they were written, and so cannot tell whether there is anything new."""
@@ -46,6 +46,11 @@ def digest(files: Mapping[str, Path]) -> str:
     for name, path in files.items():
         total.update(f"{name}:{hashlib.sha256(path.read_bytes()).hexdigest()};".encode())
     return total.hexdigest()
+
+
+def read_json(path: Path, default: Any) -> Any:
+    """The content of a JSON file; the default where there is none."""
+    return json.loads(path.read_text()) if path.is_file() else default
 
 
 def read_receipt(run_dir: Path) -> Receipt | None:

@@ -11,9 +11,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from analysis.schema import DATASETS, EPISODES, PROVENANCE, SPEC, TRAINING, RunSpec, leaves
-from orchestrator.tracking.metrics import Curves, finite, learning_curves, reported, seed_scores
-from orchestrator.tracking.names import allowed_name, short_text
-from orchestrator.tracking.receipt import Status, digest, published_files
+from orchestrator.tracking.changes import changed_fields, short_changes
+from orchestrator.tracking.metrics import (
+    Curves,
+    finite,
+    learning_curves,
+    mean_score,
+    reported,
+    seed_scores,
+)
+from orchestrator.tracking.names import allowed_name, run_name, short_id, short_text
+from orchestrator.tracking.receipt import Status, digest, published_files, read_json
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,14 +52,24 @@ class RunView:
         return hashlib.sha256(f"{json.dumps(plain)}{digest(self.files)}".encode()).hexdigest()
 
 
-def read_views(run_dir: Path, status: Status) -> list[RunView]:
-    """The parent's view, then one for each (method, seed) that there is something to show of."""
+def read_views(
+    run_dir: Path, status: Status, training: list[dict[str, Any]] | None = None
+) -> list[RunView]:
+    """The parent's view, then one for each (method, seed) that there is something to show of.
+
+    training: in place of `training.json`.
+    """
     plain = json.loads((run_dir / SPEC).read_text())
     provenance = json.loads((run_dir / PROVENANCE).read_text())
-    training = _read_json(run_dir / TRAINING, [])
+    training = read_json(run_dir / TRAINING, []) if training is None else training
     spec = RunSpec.from_dict(plain)
     parent = RunView(
-        name=f"{spec.name} {spec.scale}",
+        name=run_name(
+            spec.name,
+            spec.scale,
+            short_changes(changed_fields(plain["spec"])),
+            short_id(provenance["run_id"]),
+        ),
         status=status,
         identity=(provenance["run_id"], "", ""),
         tags=_tags(spec, provenance) | {NOTE: spec.title, "skillstitch.run_dir": str(run_dir)},
@@ -64,7 +82,7 @@ def read_views(run_dir: Path, status: Status) -> list[RunView]:
             *(reported(run_dir / "report", entry.id) for entry in spec.tables),
         ),
         curves={},
-        datasets=_read_json(run_dir / DATASETS, []),
+        datasets=read_json(run_dir / DATASETS, []),
         files={
             name: path
             for name, path in published_files(run_dir).items()
@@ -91,15 +109,18 @@ def _child(
 ) -> RunView:
     """One method under one seed, its metrics named as all others' so that they can be compared."""
     alone = replace(spec, methods={method: spec.methods[method]}, seeds=(seed,))
-    numbers = finite(*(seed_scores(episodes, alone, entry) for entry in spec.tables))
+    numbers = finite(
+        mean_score(episodes), *(seed_scores(episodes, alone, entry) for entry in spec.tables)
+    )
     return RunView(
-        name=f"{method} seed {seed}",
-        status="FAILED" if parent.status == "FAILED" and not numbers else "FINISHED",
+        name=run_name(method, f"seed {seed}", short_id(parent.identity[0])),
+        status="FINISHED" if numbers else parent.status,
         identity=(parent.identity[0], method, str(seed)),
         tags={name: value for name, value in parent.tags.items() if name != NOTE},
         params=parent.params | _overrides(method) | {"method": method, "seed": str(seed)},
         numbers=numbers,
         curves=learning_curves(method, spec.models.get(method), seed, training),
+        datasets=parent.datasets,
     )
 
 
@@ -129,7 +150,3 @@ def _read_episodes(run_dir: Path) -> pd.DataFrame:
 
     path = run_dir / EPISODES
     return pd.read_parquet(path) if path.is_file() else pd.DataFrame(columns=COLUMNS)
-
-
-def _read_json(path: Path, default: Any) -> Any:
-    return json.loads(path.read_text()) if path.is_file() else default

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 import time
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from threading import Event
 from typing import TYPE_CHECKING, Any
 
 from analysis.schema import SPEC
@@ -27,10 +29,18 @@ class Publisher:
     """Brings the MLflow runs of one run directory to what they should be."""
 
     def __init__(
-        self, client: MlflowClient, experiment: str, files: Mapping[str, Path], run_id: str
+        self,
+        client: MlflowClient,
+        experiment: str,
+        files: Mapping[str, Path],
+        run_id: str,
+        ending: Event | None = None,  # once it is set, `write` breaks off
+        points: dict[tuple[str, str], int] | None = None,  # MLflow run, metric → that are there
     ) -> None:
         self._client = client
         self._experiment = experiment
+        self._ending = ending or Event()
+        self._points = {} if points is None else points
         self._deadline = time.monotonic() + PUBLISH_SECONDS
         self._began = int(files[SPEC].stat().st_mtime * 1000)
         self._ended = int(max(path.stat().st_mtime for path in files.values()) * 1000)
@@ -44,6 +54,7 @@ class Publisher:
         above = self._take(parent, {})
         self._fill(above, parent)
         for child in children:
+            self._check_time()
             run = self._take(child, {"mlflow.parentRunId": above.info.run_id})
             self._fill(run, child)
             self._settle(run, child.status)
@@ -74,19 +85,26 @@ class Publisher:
         from mlflow.entities import Param, RunTag
 
         run_id = run.info.run_id
-        for metrics in _batches(_metrics(run, view), METRIC_BATCH):
+        for metrics in _batches(_metrics(run, view, self._points), METRIC_BATCH):
             self._check_time()
             self._client.log_batch(run_id, metrics=metrics)
-        for params in _batches([Param(*item) for item in view.params.items()], BATCH):
+        self._points |= {(run_id, key): len(curve) for key, curve in view.curves.items()}
+        new_params = view.params.items() - run.data.params.items()
+        new_tags = view.tags.items() - run.data.tags.items()
+        for params in _batches([Param(*item) for item in sorted(new_params)], BATCH):
+            self._check_time()
             self._client.log_batch(run_id, params=params)
         if view.datasets:
+            self._check_time()
             self._client.log_inputs(run_id, datasets=[_dataset(entry) for entry in view.datasets])
         for name, path in view.files.items():
             self._check_time()
             folder = Path(name).parent.as_posix()
             self._client.log_artifact(run_id, str(path), None if folder == "." else folder)
-        for tags in _batches([RunTag(*item) for item in view.tags.items()], BATCH):
+        for tags in _batches([RunTag(*item) for item in sorted(new_tags)], BATCH):
+            self._check_time()
             self._client.log_batch(run_id, tags=tags)
+        self._check_time()
         self._client.set_tag(run_id, CONTENT, content)
 
     def _settle(self, run: Run, status: str) -> None:
@@ -102,12 +120,19 @@ class Publisher:
         self._client.delete_run(run.info.run_id)  # to MLflow's bin, from which it can be restored
 
     def _check_time(self) -> None:
-        if time.monotonic() > self._deadline:
-            raise TrackingError(f"it took more than {PUBLISH_SECONDS:.0f} s")
+        check_time(self._ending, self._deadline)
 
 
-def _metrics(run: Run, view: RunView) -> list[Any]:
-    """Numbers that changed, and all curves in the order of their steps.
+def check_time(ending: Event, deadline: float = math.inf) -> None:
+    """Raises TrackingError when a publication is to break off."""
+    if ending.is_set():
+        raise TrackingError("the work ended meanwhile")
+    if time.monotonic() > deadline:
+        raise TrackingError(f"it took more than {PUBLISH_SECONDS:.0f} s")
+
+
+def _metrics(run: Run, view: RunView, points: Mapping[tuple[str, str], int]) -> list[Any]:
+    """Numbers that changed, and curves in the order of their steps, without points that are there.
 
     MLflow drops a row that it has already, timestamp included: curves carry the run's start time.
     A number that changed needs a later time to replace the old one.
@@ -117,12 +142,12 @@ def _metrics(run: Run, view: RunView) -> list[Any]:
     now = int(time.time() * 1000)
     known = run.data.metrics
     changed = [Metric(k, v, now, 0) for k, v in view.numbers.items() if known.get(k) != v]
-    points = [
+    grown = [
         Metric(key, value, run.info.start_time, step)
         for key, curve in view.curves.items()
-        for step, value in curve
+        for step, value in curve[points.get((run.info.run_id, key), 0) :]
     ]
-    return changed + sorted(points, key=lambda point: point.step)
+    return changed + sorted(grown, key=lambda point: point.step)
 
 
 def _dataset(entry: Mapping[str, Any]) -> Any:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import time
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from orchestrator.builders.registry import BUILDERS
@@ -12,11 +11,11 @@ from orchestrator.errors import BadDataError, ChangedError, IncompleteError
 from orchestrator.executors.protocol import Executor
 from orchestrator.storage.ledger import Ledger
 from orchestrator.storage.store import CorruptArtifactError, Store
-from orchestrator.work.checkpoints import news_of
 from orchestrator.work.jobs import ATTEMPTS, BuildJob, Report
 from orchestrator.work.plan import Plan
 from orchestrator.work.progress import Progress
 from orchestrator.work.recipes import Recipe
+from orchestrator.work.trainings import Trainings
 from orchestrator.work.worker import build
 
 
@@ -52,35 +51,6 @@ def _check_artifact(ledger: Ledger, recipe: Recipe, digest: str) -> None:
 
 
 @dataclass
-class Trainings:
-    """What a person is told of trainings while they go on: updates, their rate, the losses."""
-
-    store: Store
-    recipes: Mapping[str, Recipe]  # by key
-    _since: float = field(default_factory=time.time)
-    _before: dict[str, tuple[float, int]] = field(default_factory=dict)  # when, how many updates
-
-    def told(self, keys: Iterable[str]) -> str:
-        """In a few words; trainings whose checkpoints are not seen from here tell nothing."""
-        return "; ".join(filter(None, map(self._told, sorted(keys))))
-
-    def _told(self, key: str) -> str:
-        news, now = news_of(self.store.checkpoint_folder(key), self._since), time.monotonic()
-        if news is None:
-            return ""
-        recipe = self.recipes[key]
-        seed = f", seed {recipe.params['seed']}" if "seed" in recipe.params else ""
-        line = f"{recipe.kind}{seed}: {news.done:,} of {news.updates:,} updates"
-        then, done = self._before.setdefault(key, (now, news.done))
-        if news.done > done:
-            line += f" ({(news.done - done) / (now - then):.0f}/s)"
-        elif news.done < done:  # another attempt
-            self._before[key] = now, news.done
-        losses = [f"{name} {value:.3g}" for name, value in news.losses.items()]
-        return ", ".join([line, *losses[:1]])
-
-
-@dataclass
 class Builds:
     """Makes missing artifacts, each as soon as its inputs are there."""
 
@@ -99,12 +69,14 @@ class Builds:
         """
         recipes = self.plan.recipes
         missing = {key: r for key, r in recipes.items() if key in wanted - present}
-        for key in self._inputs_of(missing.values()) & present:
-            self._provide(recipes[key])
         self.progress.phase(phase, len(wanted), len(wanted & present))
         available, submitted = set(present), set[str]()
-        trainings = Trainings(self.store, missing)
-        with self.progress.watching(lambda: trainings.told(submitted - available)):
+        trainings = Trainings(self.store, missing, len(self.plan.spec.skill_names))
+        with self.progress.watching(
+            lambda: trainings.under_way(available & submitted, submitted - available)
+        ):
+            for key in self._inputs_of(missing.values()) & present:
+                self._provide(recipes[key])
             return self._run(missing, available, submitted)
 
     def _run(self, missing: dict[str, Recipe], available: set[str], submitted: set[str]) -> float:

@@ -24,6 +24,7 @@ from safetensors.torch import load, save
 from orchestrator.errors import StorageError
 from orchestrator.storage.store import write_atomically
 from stitching.models.checkpoints import Checkpoint
+from stitching.models.training import Curves
 from stitching.streams import Label
 
 FORMAT = 1
@@ -61,7 +62,7 @@ class Checkpoints:
         where = [FORMAT, torch.__version__, np.__version__, torch.backends.cpu.get_cpu_capability()]
         told_apart = json.dumps([*where, *labels], default=int)
         name = hashlib.blake2b(told_apart.encode(), digest_size=16).hexdigest()
-        return CheckpointFile(self.folder / name, self)
+        return CheckpointFile(self.folder / name, self, labels)
 
     @property
     def spent(self) -> float:
@@ -75,6 +76,7 @@ class CheckpointFile:
 
     path: Path
     build: Checkpoints  # whose it is
+    labels: tuple[Label, ...] = ()  # of the training
     _told: float = -math.inf  # when, on the monotonic clock
 
     def write(self, tensors: dict[str, torch.Tensor], plain: dict[str, Any]) -> None:
@@ -96,9 +98,11 @@ class CheckpointFile:
         self._told = now
         losses = {name: curve[-1][1] for name, curve in curves.items() if curve}
         news = {"done": done, "updates": updates, "losses": losses}
+        news |= {"labels": self.labels, "curves": curves}
+        text = json.dumps(news, default=int)
         with suppress(OSError):
             self.path.parent.mkdir(exist_ok=True)
-            self.path.with_name(f"{self.path.name}{NEWS}").write_text(json.dumps(news))
+            self.path.with_name(f"{self.path.name}{NEWS}").write_text(text)
 
     def read(self) -> tuple[dict[str, torch.Tensor], dict[str, Any]] | None:
         try:
@@ -124,6 +128,7 @@ class News:
     done: int  # updates, of all its trainings that have begun
     updates: int
     losses: dict[str, float]  # recorded last, of the one that is under way
+    trainings: int = 1  # that have begun
 
 
 def news_of(folder: Path, since: float = 0.0) -> News | None:
@@ -131,17 +136,28 @@ def news_of(folder: Path, since: float = 0.0) -> News | None:
 
     since: seconds of the epoch; what was told before is of an attempt that has ended.
     """
+    told = _told(folder, since)
+    if not told:
+        return None
+    _, newest = max(told, key=lambda news: news[0])
+    done, updates = (sum(news[name] for _, news in told) for name in ("done", "updates"))
+    return News(done, updates, newest["losses"], len(told))
+
+
+def curves_of(folder: Path, since: float = 0.0) -> list[tuple[list[Label], Curves]]:
+    """Labels and curves so far of each training that keeps checkpoints here, as `news_of`."""
+    return [(news["labels"], news["curves"]) for _, news in _told(folder, since)]
+
+
+def _told(folder: Path, since: float) -> list[tuple[float, dict[str, Any]]]:
+    """When each training in a folder has told something last, and what."""
     told = []
     with suppress(OSError):  # the folder goes once the artifact is there
         for file in sorted(folder.glob(f"*{NEWS}")):
             with suppress(OSError, ValueError):  # it is being written, or is gone
                 if (when := file.stat().st_mtime) >= since:
                     told.append((when, json.loads(file.read_text())))
-    if not told:
-        return None
-    _, newest = max(told, key=lambda news: news[0])
-    done, updates = (sum(news[name] for _, news in told) for name in ("done", "updates"))
-    return News(done, updates, newest["losses"])
+    return told
 
 
 def _digest(data: bytes) -> bytes:

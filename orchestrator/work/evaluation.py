@@ -12,7 +12,7 @@ from orchestrator.storage.ledger import Ledger, Outcome, PlayCounts
 from orchestrator.storage.store import Store
 from orchestrator.work.jobs import ATTEMPTS, BlockReport, BlockTask, PlayJob, Report
 from orchestrator.work.plan import Node, Plan
-from orchestrator.work.progress import Progress
+from orchestrator.work.progress import Progress, UnderWay
 
 # Blocks sent to a worker at once: few enough that little is lost with it, enough to keep it busy.
 LARGEST_BUNDLE = 64
@@ -39,6 +39,16 @@ class Evaluation:
     def run(self) -> None:
         """Play everything that is missing; blocks that fail three times are left out."""
         self.progress.phase("evaluation", len(self.plan.tasks), 0)
+        with self.progress.watching(
+            lambda: UnderWay(f"{self._in_flight} groups of blocks under way")
+        ):
+            self._begin()
+            while self._ready or self._in_flight:
+                self._dispatch()
+                self._receive(self.executor.next())
+
+    def _begin(self) -> None:
+        """Queue what can be played at once: first skills, or what follows from finished ones."""
         self._place = {task.key: place for place, task in self.plan.tasks.items()}
         self._adopt()
         self._expected = Expectations(self.plan, self.shared.history())
@@ -47,10 +57,6 @@ class Evaluation:
                 self._expand(root, chunk)
         if self._ready:
             self._provide_models()
-        with self.progress.watching(lambda: f"{self._in_flight} groups of blocks under way"):
-            while self._ready or self._in_flight:
-                self._dispatch()
-                self._receive(self.executor.next())
 
     def _adopt(self) -> None:
         """Take over blocks that an earlier run over this store has finished."""

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
-import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from threading import Event
 
 from analysis.schema import SPEC, leaves
 from orchestrator.spec.structure import Plain
 from orchestrator.storage.claim import spec_of
 from orchestrator.storage.rundir import RunDirectory
+from orchestrator.tracking.killing import in_time, kill_runs
+from orchestrator.tracking.live import Live
 from orchestrator.tracking.metrics import finite
-from orchestrator.tracking.names import allowed_name, short_text
+from orchestrator.tracking.names import (
+    allowed_name,
+    experiment_name,
+    run_name,
+    short_id,
+    short_text,
+)
 from orchestrator.tracking.receipt import Status
 from orchestrator.tracking.run import NO_TRACKING
 from orchestrator.tracking.stores import connect, open_experiment, turn_to_write
@@ -27,21 +37,40 @@ class Tracker:
     def __init__(self, uri: str, directory: RunDirectory, run_id: str, progress: Progress) -> None:
         self._uri, self._directory, self._run_id = uri, directory, run_id
         self._progress = progress
-        self._last = time.monotonic()
 
-    def publish(self, status: Status, *, patient: bool = False) -> None:
-        """Bring MLflow up to date; a patient publication is left out soon after another."""
-        soon = patient and time.monotonic() - self._last < SECONDS_BETWEEN
-        if self._uri == NO_TRACKING or soon:
+    @contextmanager
+    def told(self) -> Iterator[None]:
+        """MLflow shows the sweep within it as RUNNING, and after it how it ended."""
+        if self._uri == NO_TRACKING:
+            yield
             return
-        self._last = time.monotonic()
+        try:
+            with Live(self._publish_quietly, SECONDS_BETWEEN):
+                yield
+            self._publish_last("FINISHED")
+        except KeyboardInterrupt:
+            in_time(lambda: kill_runs(self._uri, self._benchmark, self._run_id))
+            raise
+        except Exception:
+            self._publish_last("FAILED")
+            raise
+
+    def _publish_last(self, status: Status) -> None:
         try:
             self._publish(status)
         except Exception as error:
             reason = (str(error).strip() or type(error).__name__).splitlines()[0][:300]
             self._progress.say(f"tracking: {reason}; the next command publishes what was missed")
 
-    def _publish(self, status: Status) -> None:
+    def _publish_quietly(self, ending: Event) -> None:
+        with suppress(Exception):  # the last publication brings what is missed
+            self._publish("RUNNING", ending)
+
+    @property
+    def _benchmark(self) -> str:
+        return spec_of(self._directory).benchmark
+
+    def _publish(self, status: Status, ending: Event | None = None) -> None:
         directory = self._directory
         names = (SPEC, "sweep.json", "trials.json", "confirm.json", "winner.json")
         files = {n: directory.path / n for n in names if (directory.path / n).is_file()}
@@ -53,7 +82,7 @@ class Tracker:
         }
         sweep = directory.read_json("sweep.json")
         parent = RunView(
-            name=f"sweep {sweep['name']} {sweep['scale']}",
+            name=run_name(f"sweep {sweep['name']}", sweep["scale"], short_id(self._run_id)),
             status=status,
             identity=(self._run_id, "", ""),
             tags={"mlflow.source.name": "skillstitch", "skillstitch.sweep": sweep["name"]},
@@ -65,14 +94,14 @@ class Tracker:
         children = [self._child(parent, t) for t in directory.read_json("trials.json") or []]
         with turn_to_write(self._uri):
             client = connect(self._uri)
-            benchmark = spec_of(directory).benchmark
-            experiment = open_experiment(client, self._uri, f"skillstitch/{benchmark}")
-            Publisher(client, experiment, files | pages, self._run_id).write(parent, children)
+            experiment = open_experiment(client, self._uri, experiment_name(self._benchmark))
+            files |= pages
+            Publisher(client, experiment, files, self._run_id, ending).write(parent, children)
 
     def _child(self, parent: RunView, trial: Plain) -> RunView:
         number = str(trial["trial"])
         return RunView(
-            name=f"trial {number}",
+            name=run_name(f"trial {number}", short_id(self._run_id)),
             status="FINISHED",
             identity=(self._run_id, "trial", number),
             tags=parent.tags | {"skillstitch.trial": number},

@@ -39,9 +39,9 @@ def run_tracked(place: Place) -> None:
     carry_out(tiny_spec(), settings)
 
 
-def launch(place: Place) -> subprocess.Popen[bytes]:
-    """The real command, on two workers of a Ray of its own."""
-    options = ["--workers", "2", "--tracking-uri", "none"]
+def launch(place: Place, *options: str) -> subprocess.Popen[bytes]:
+    """The real command; by itself on two workers of a Ray of its own, without MLflow."""
+    options = options or ("--workers", "2", "--tracking-uri", "none")
     paths = ["--out", str(place.out), "--store", str(place.store_root)]
     command = [sys.executable, "-m", "orchestrator.cli", "run", str(TINY), *options, *paths]
     place.root.mkdir(parents=True, exist_ok=True)

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -26,7 +27,8 @@ from sweeps.search import run_search
 from sweeps.space import Dimension
 from sweeps.spec import Confirm, load_sweep
 from sweeps.sweep import carry_out
-from tests.orchestrator.tiny import TINY, Lines
+from tests.orchestrator.launched import statuses
+from tests.orchestrator.tiny import TINY, Lines, Place
 from tests.sweeps.tiny import TINY_SWEEP, settings, sweep_in, tiny_sweep
 
 ALPHA, BETA = "mb_stitch.alpha", "mb_stitch.beta"
@@ -269,14 +271,40 @@ def test_mlflow_shows_the_sweep_and_each_trial_once(done: Path) -> None:
     experiment = client.get_experiment_by_name("skillstitch/maze")
     assert experiment is not None
     runs = client.search_runs([experiment.experiment_id])
+    run_id = json.loads((done / "sweep" / "identity.json").read_text())["run_id"]
     parents = [run for run in runs if "mlflow.parentRunId" not in run.data.tags]
-    assert [run.info.run_name for run in parents] == ["sweep tiny-sweep paper"]
+    assert [run.info.run_name for run in parents] == [f"sweep tiny-sweep · paper · {run_id[:4]}"]
     children = [run for run in runs if "mlflow.parentRunId" in run.data.tags]
-    assert sorted(run.info.run_name for run in children) == sorted(f"trial {n}" for n in range(10))
+    assert sorted(run.info.run_name for run in children) == sorted(
+        f"trial {n} · {run_id[:4]}" for n in range(10)
+    )
     assert {run.info.status for run in runs} == {"FINISHED"}
     told = json.loads((done / "sweep" / "trials.json").read_text())
     gains = {int(run.info.run_name.split()[1]): run.data.metrics["gain"] for run in children}
     assert gains == {trial["trial"]: trial["gain"] for trial in told}
+
+
+def test_mlflow_shows_an_interrupted_sweep_as_killed(
+    done: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mlflow")
+    uri = f"sqlite:///{done / 'mlflow.db'}"
+
+    def interrupted(*_: object, **__: object) -> None:
+        deadline = time.monotonic() + 60
+        while "RUNNING" not in statuses(Place(done)):
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("sweeps.sweep.write_report", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        sweep_in(done, tiny_sweep(), tracking_uri=uri)
+    assert "KILLED" in statuses(Place(done))
+    assert "RUNNING" not in statuses(Place(done))
+    monkeypatch.undo()
+    sweep_in(done, tiny_sweep(), tracking_uri=uri)
+    assert set(statuses(Place(done))) == {"FINISHED"}
 
 
 def test_tracking_that_fails_never_stops_the_search(done: Path) -> None:

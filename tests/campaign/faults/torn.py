@@ -57,8 +57,8 @@ def _torn(ground: Ground, before: Place, name: str, trial: int) -> str:
     place.out.mkdir(parents=True, exist_ok=True)
     for file in before.out.glob(f"{LEDGER}*"):
         shutil.copy(file, place.out)
-    with (place.out / name).open("r+b") as file:
-        file.truncate((before.out / name).stat().st_size - trial - 1)
+    with (place.out / name).open("r+b") as opened:
+        opened.truncate((before.out / name).stat().st_size - trial - 1)
     left = _looked_into(ground, place.out / LEDGER)
     if "move it away and run the same command again" in left:
         for file in place.out.glob(f"{LEDGER}*"):

@@ -12,12 +12,12 @@ from tests.orchestrator.tracking.fake_run import Seen
 
 
 def test_unchanged_content_is_skipped_without_importing_mlflow(run_dir: Path, uri: str) -> None:
-    assert publish(run_dir, uri, finished=True).ok
+    assert publish(run_dir, uri, "FINISHED").ok
     code = (
         "import sys; from pathlib import Path; from orchestrator import tracking\n"
         f"run, uri = Path({str(run_dir)!r}), {uri!r}\n"
-        "assert tracking.publish(run, uri, finished=False).skipped\n"
-        "assert tracking.publish(run, uri, finished=True).skipped\n"
+        "assert tracking.publish(run, uri, 'RUNNING').skipped\n"
+        "assert tracking.publish(run, uri, 'FINISHED').skipped\n"
         "assert 'mlflow' not in sys.modules and 'pandas' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
@@ -26,7 +26,7 @@ def test_unchanged_content_is_skipped_without_importing_mlflow(run_dir: Path, ur
 
 def test_what_is_published_again(run_dir: Path, uri: str, tmp_path: Path) -> None:
     def skipped(where: str = uri) -> bool:
-        return publish(run_dir, where, finished=True).skipped
+        return publish(run_dir, where, "FINISHED").skipped
 
     assert not skipped()
     assert skipped()
@@ -43,11 +43,11 @@ def test_what_is_published_again(run_dir: Path, uri: str, tmp_path: Path) -> Non
 @pytest.mark.parametrize("content", ["", "{", "[]", '{"uri": "x"}'])
 def test_a_damaged_receipt_counts_as_none(run_dir: Path, uri: str, content: str) -> None:
     (run_dir / "tracking.json").write_text(content)
-    assert not publish(run_dir, uri, finished=True).skipped
+    assert not publish(run_dir, uri, "FINISHED").skipped
 
 
 def test_a_run_that_never_began_has_nothing_to_show(run_dir: Path, uri: str) -> None:
     (run_dir / "provenance.json").unlink()
     skipped = PublishOutcome(ok=True, skipped=True)
-    assert publish(run_dir, uri, finished=False, failed=True) == skipped
+    assert publish(run_dir, uri, "FAILED") == skipped
     assert not (run_dir / "tracking.json").exists()

@@ -55,11 +55,11 @@ def answers(url: str) -> bool:
 
 @pytest.mark.slow
 def test_publishing_to_a_server(run_dir: Path, server: str) -> None:
-    assert publish(run_dir, server, finished=False).ok
-    assert publish(run_dir, server, finished=True).ok
+    assert publish(run_dir, server, "RUNNING").ok
+    assert publish(run_dir, server, "FINISHED").ok
     seen = Seen(server)
     assert seen.states() == ("FINISHED", {"FINISHED"})
     assert len(seen.children) == CHILDREN
     artifacts = {file.path for file in seen.client.list_artifacts(seen.parent.info.run_id)}
     assert artifacts == {"spec.json", "provenance.json", "report"}
-    assert publish(run_dir, server, finished=True).skipped
+    assert publish(run_dir, server, "FINISHED").skipped

@@ -21,13 +21,13 @@ def test_a_server_that_is_down_is_said_in_one_line(run_dir: Path) -> None:
         port = listener.getsockname()[1]
     uri = f"http://user:secret@127.0.0.1:{port}"
     start = time.monotonic()
-    outcome = publish(run_dir, uri, finished=True)
+    outcome = publish(run_dir, uri, "FINISHED")
     assert time.monotonic() - start < 15
     assert not outcome.ok
     assert "\n" not in outcome.error
     assert f"127.0.0.1:{port}" in outcome.error
     assert "secret" not in outcome.error + (run_dir / "tracking.json").read_text()
-    assert not publish(run_dir, uri, finished=True).skipped
+    assert not publish(run_dir, uri, "FINISHED").skipped
 
 
 @contextmanager
@@ -53,14 +53,14 @@ def test_a_locked_database_is_said_and_made_up_for_later(
     monkeypatch.setattr(stores, "LOCK_SECONDS", 1.0)
     with locked(Path(uri.removeprefix("sqlite:///"))):
         start = time.monotonic()
-        outcome = publish(run_dir, uri, finished=True)
+        outcome = publish(run_dir, uri, "FINISHED")
         assert time.monotonic() - start < 5
         assert not outcome.ok
         assert "locked" in outcome.error
-    made_up_for = publish(run_dir, uri, finished=True)
+    made_up_for = publish(run_dir, uri, "FINISHED")
     assert made_up_for.ok
     assert not made_up_for.skipped
-    assert publish(run_dir, uri, finished=True).skipped
+    assert publish(run_dir, uri, "FINISHED").skipped
 
 
 @pytest.mark.parametrize(("name", "ok"), [("seed#1 a", True), ("50%23", False), ("why?", False)])
@@ -70,7 +70,7 @@ def test_a_folder_whose_name_means_something_in_a_uri(
     """It is used, or refused in one line; no other folder appears."""
     folder = tmp_path / "kept" / name
     folder.mkdir(parents=True)
-    outcome = publish(run_dir, default_uri(folder), finished=True)
+    outcome = publish(run_dir, default_uri(folder), "FINISHED")
     assert outcome.ok == ok
     assert (folder / "mlflow.db").exists() == ok
     assert ok or "--tracking-uri sqlite:///FILE" in outcome.error
@@ -79,23 +79,23 @@ def test_a_folder_whose_name_means_something_in_a_uri(
 
 @pytest.mark.parametrize("uri", ["nonsense://x", "sqlite:////proc/nowhere/mlflow.db"])
 def test_a_store_that_cannot_be_is_no_reason_to_stop(run_dir: Path, uri: str) -> None:
-    outcome = publish(run_dir, uri, finished=True)
+    outcome = publish(run_dir, uri, "FINISHED")
     assert not outcome.ok
     assert outcome.error
 
 
 def test_a_deleted_experiment_is_named(run_dir: Path, uri: str) -> None:
-    publish(run_dir, uri, finished=True)
+    publish(run_dir, uri, "FINISHED")
     seen = Seen(uri)
     seen.client.delete_experiment(seen.experiment)
     rewind(run_dir)
-    assert "skillstitch/maze was deleted" in publish(run_dir, uri, finished=True).error
+    assert "skillstitch/maze was deleted" in publish(run_dir, uri, "FINISHED").error
 
 
 def spawn(run_dir: Path, uri: str) -> subprocess.Popen[bytes]:
     code = (
         "from pathlib import Path; from orchestrator.tracking import publish\n"
-        f"outcome = publish(Path({str(run_dir)!r}), {uri!r}, finished=True)\n"
+        f"outcome = publish(Path({str(run_dir)!r}), {uri!r}, 'FINISHED')\n"
         "assert outcome.ok, outcome.error"
     )
     return subprocess.Popen([sys.executable, "-c", code])
@@ -117,9 +117,9 @@ def test_a_schema_that_another_thread_creates(run_dir: Path, tmp_path: Path) -> 
     (tmp_path / "mlflow.db.new").write_bytes(b"what a kill left of an earlier attempt")
     uri = default_uri(tmp_path)
     other = finish_run(train_run(start_run(tmp_path / "other", run_id="other")))
-    thread = threading.Thread(target=publish, args=(other, uri), kwargs={"finished": True})
+    thread = threading.Thread(target=publish, args=(other, uri, "FINISHED"))
     thread.start()
-    assert publish(run_dir, uri, finished=True).ok
+    assert publish(run_dir, uri, "FINISHED").ok
     thread.join()
     assert Seen(uri).states() == ("FINISHED", {"FINISHED"})
     assert not (tmp_path / "mlflow.db.new").exists()

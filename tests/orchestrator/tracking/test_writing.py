@@ -20,33 +20,33 @@ from tests.orchestrator.tracking.fake_run import (
 
 
 def test_republishing_makes_no_duplicates(run_dir: Path, uri: str) -> None:
-    publish(run_dir, uri, finished=True)
+    publish(run_dir, uri, "FINISHED")
     before = {table: rows(uri, table) for table in ("runs", "metrics", "inputs", "datasets")}
     rewind(run_dir)
-    assert publish(run_dir, uri, finished=True) == PublishOutcome(ok=True)
+    assert publish(run_dir, uri, "FINISHED") == PublishOutcome(ok=True)
     assert {table: rows(uri, table) for table in before} == before
 
 
 def test_republishing_what_was_published_in_part_makes_no_duplicates(
     run_dir: Path, uri: str
 ) -> None:
-    publish(run_dir, uri, finished=True)
+    publish(run_dir, uri, "FINISHED")
     before = {table: rows(uri, table) for table in ("runs", "metrics", "inputs", "datasets")}
     seen = Seen(uri)
     for run in (seen.parent, *seen.children.values()):  # none is known to be complete
         seen.client.delete_tag(run.info.run_id, CONTENT)
     rewind(run_dir)
-    assert publish(run_dir, uri, finished=True).ok
+    assert publish(run_dir, uri, "FINISHED").ok
     assert {table: rows(uri, table) for table in before} == before
 
 
 def test_changed_scores_replace_the_old_ones(run_dir: Path, uri: str) -> None:
-    publish(run_dir, uri, finished=True)
+    publish(run_dir, uri, "FINISHED")
     report(run_dir, make_episodes().assign(accomplished=0, score=0.0))
-    assert publish(run_dir, uri, finished=True).ok
+    assert publish(run_dir, uri, "FINISHED").ok
     seen = Seen(uri)
-    assert seen.parent.data.metrics["table1/2 goals/no-stitch/score"] == 0
-    assert seen.children["no-stitch", 0].data.metrics["table1/2 goals/score"] == 0
+    assert seen.parent.data.metrics["table1/2_goals/no-stitch/score"] == 0
+    assert seen.children["no-stitch", 0].data.metrics["table1/2_goals/score"] == 0
     curve = seen.client.get_metric_history(
         seen.children["no-stitch", 0].info.run_id, "agent/value_loss"
     )
@@ -54,16 +54,16 @@ def test_changed_scores_replace_the_old_ones(run_dir: Path, uri: str) -> None:
 
 
 def test_changed_params_make_a_new_run(run_dir: Path, uri: str) -> None:
-    publish(run_dir, uri, finished=True)
+    publish(run_dir, uri, "FINISHED")
     write_json(run_dir / "spec.json", make_spec() | {"spec": {"episodes": 3}})
-    assert publish(run_dir, uri, finished=True).ok
+    assert publish(run_dir, uri, "FINISHED").ok
     seen = Seen(uri)
     assert seen.count == 1 + CHILDREN
     assert seen.parent.data.params["episodes"] == "3"
 
 
 def test_what_a_kill_left_running_is_reconciled(run_dir: Path, uri: str) -> None:
-    publish(run_dir, uri, finished=True)
+    publish(run_dir, uri, "FINISHED")
     seen = Seen(uri)
     for run in (seen.parent, seen.children["mf-stitch", 1]):
         seen.client.update_run(run.info.run_id, status="RUNNING")
@@ -76,7 +76,7 @@ def test_what_a_kill_left_running_is_reconciled(run_dir: Path, uri: str) -> None
         )
     ]
     rewind(run_dir)
-    assert publish(run_dir, uri, finished=True).ok
+    assert publish(run_dir, uri, "FINISHED").ok
 
     after = Seen(uri)
     assert after.states() == ("FINISHED", {"FINISHED"})
@@ -105,9 +105,9 @@ def test_a_publish_that_breaks_off_is_completed_by_the_next(
 
     monkeypatch.setattr(MlflowClient, step, dies_the_second_time)
     with pytest.raises(KeyboardInterrupt):
-        publish(run_dir, uri, finished=True)
+        publish(run_dir, uri, "FINISHED")
     monkeypatch.undo()
-    outcome = publish(run_dir, uri, finished=True)
+    outcome = publish(run_dir, uri, "FINISHED")
     assert outcome.ok
     assert not outcome.skipped
     seen = Seen(uri)
@@ -119,7 +119,7 @@ def test_a_slow_store_gets_the_rest_next_time(
     run_dir: Path, uri: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(writing, "PUBLISH_SECONDS", 0.0)
-    assert "more than" in publish(run_dir, uri, finished=True).error
+    assert "more than" in publish(run_dir, uri, "FINISHED").error
     monkeypatch.undo()
-    assert publish(run_dir, uri, finished=True).ok
+    assert publish(run_dir, uri, "FINISHED").ok
     assert Seen(uri).count == 1 + CHILDREN

@@ -1,24 +1,14 @@
 """What a person is told while work goes on."""
 
 import io
-import math
 import re
 import time
-from pathlib import Path
 
 import pytest
 from rich.console import Console
 
-from orchestrator.storage.store import Store
-from orchestrator.work import checkpoints, progress
-from orchestrator.work.building import Trainings
-from orchestrator.work.checkpoints import CheckpointFile, Checkpoints, news_of
-from orchestrator.work.progress import ConsoleProgress
-from orchestrator.work.recipes import Recipe
-from stitching.envs.protocol import ActionSpace
-from stitching.models.checkpoints import checkpoints_by
-from stitching.models.dynamics import DynamicsConfig, train_dynamics
-from tests.stitching.models.test_iql import experience_of
+from orchestrator.work import progress
+from orchestrator.work.progress import ConsoleProgress, UnderWay
 
 
 @pytest.fixture
@@ -38,7 +28,7 @@ def test_without_a_terminal_there_are_lines_while_nothing_is_finished() -> None:
     console = Console(file=io.StringIO(), width=200)
     with ConsoleProgress(console) as told:
         told.phase("training", 3, 1)
-        with told.watching(lambda: "agent seed 0"):
+        with told.watching(lambda: UnderWay("agent seed 0")):
             time.sleep(0.3)
     first, *others = lines_of(console)
     assert first == "training: 1 of 3 already there"
@@ -52,56 +42,15 @@ def test_on_a_terminal_the_bar_says_it() -> None:
     console = Console(file=io.StringIO(), width=200, force_terminal=True)
     with ConsoleProgress(console) as told:
         told.phase("training", 3, 1)
-        with told.watching(lambda: "agent seed 0"):
+        with told.watching(lambda: UnderWay("agent seed 0")):
             time.sleep(0.3)
     assert "agent seed 0" in "".join(lines_of(console))
     assert "already there" not in "".join(lines_of(console))
 
 
-def test_a_training_tells_how_far_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(checkpoints, "SECONDS_BETWEEN_NEWS", 0.0)
-    store = Store(tmp_path)
-    folder = store.checkpoints("key")
-    trainings = Trainings(store, {"key": Recipe("dynamics", {"seed": 2})})
-    assert trainings.told(["key"]) == ""
-    config = DynamicsConfig(updates=20, width=8, members=2, log_every=5)
-    with checkpoints_by(Checkpoints(folder).of):
-        train_dynamics(experience_of(ActionSpace(2, discrete=False)).data, config, "seed", 2)
-    news = news_of(folder)
-    assert news is not None
-    assert (news.done, news.updates) == (20, 20)
-    assert news.losses
-    assert trainings.told(["key"]).startswith("dynamics, seed 2: 20 of 20 updates, ")
-
-
-def test_the_rate_is_that_since_the_first_look(tmp_path: Path) -> None:
-    store = Store(tmp_path)
-    folder = store.checkpoints("key")
-    file, trainings = (
-        CheckpointFile(folder / "x", Checkpoints(folder)),
-        Trainings(store, {"key": Recipe("agent", {"seed": 0})}),
-    )
-
-    def told(done: int) -> str:
-        file._told = -math.inf  # whatever was told just before
-        file.tell(done, 5000, {"loss": [(1, 0.5)]})
-        return trainings.told(["key"])
-
-    assert told(1000) == "agent, seed 0: 1,000 of 5,000 updates, loss 0.5"
-    time.sleep(0.1)
-    assert re.fullmatch(r"agent, seed 0: 2,000 of 5,000 updates \(\d+/s\), loss 0.5", told(2000))
-    assert told(500) == "agent, seed 0: 500 of 5,000 updates, loss 0.5"  # it began again
-
-
-def test_what_an_earlier_attempt_told_does_not_count(tmp_path: Path) -> None:
-    CheckpointFile(tmp_path / "x", Checkpoints(tmp_path)).tell(5, 5, {})
-    assert news_of(tmp_path) is not None
-    assert news_of(tmp_path, since=time.time() + 60) is None
-
-
 @pytest.mark.usefixtures("impatient")
 def test_a_look_that_fails_disturbs_nothing() -> None:
-    def look() -> str:
+    def look() -> UnderWay:
         raise OSError("the folder is gone")
 
     console = Console(file=io.StringIO(), width=200)
@@ -113,11 +62,59 @@ def test_a_look_that_fails_disturbs_nothing() -> None:
     assert all("gone" not in line for line in lines_of(console))
 
 
-def test_what_cannot_be_read_tells_nothing(tmp_path: Path) -> None:
-    (tmp_path / "torn.news").write_text('{"done": 1')
-    assert news_of(tmp_path) is None
-    assert news_of(tmp_path / "nowhere") is None
-    sealed = tmp_path / "file"
-    sealed.write_text("")
-    CheckpointFile(sealed / "below", Checkpoints(None)).tell(1, 2, {})  # raises nothing
-    assert news_of(sealed) is None
+@pytest.mark.usefixtures("impatient")
+def test_the_bar_moves_within_a_training() -> None:
+    console = Console(file=io.StringIO(), width=200, force_terminal=True)
+    shares = iter([0.25, 0.5, 0.75])
+    with ConsoleProgress(console) as told:
+        told.phase("training", 3, 1)
+        with told.watching(lambda: UnderWay(share=next(shares, 0.8))):
+            time.sleep(0.5)
+    drawn = "".join(lines_of(console))
+    assert {"25%", "80%", "1/3"} <= set(re.findall(r"\d+%|\d/\d", drawn))
+    assert re.search(r"left \S*0:\d\d:\d\d", drawn)  # what that leaves, at this rate
+
+
+@pytest.mark.usefixtures("impatient")
+def test_lines_tell_the_share_and_the_time_left() -> None:
+    console = Console(file=io.StringIO(), width=200)
+    began = time.monotonic()
+    with ConsoleProgress(console) as told:
+        told.phase("training", 3, 1)
+        with told.watching(lambda: UnderWay(share=(time.monotonic() - began) / 100)):
+            time.sleep(0.3)
+    last = lines_of(console)[-1]
+    assert (left := re.fullmatch(r"training: 1/3 \(0%\) after 0 s, about (\d+) s left", last))
+    assert 90 <= int(left[1]) <= 110
+
+
+@pytest.mark.usefixtures("impatient")
+def test_there_is_a_line_whatever_goes_on() -> None:
+    """Before there is anything to count, in steps, between and after phases."""
+    console = Console(file=io.StringIO(), width=200)
+    with ConsoleProgress(console) as told:
+        time.sleep(0.2)
+        with told.step("starting workers"):
+            time.sleep(0.2)
+        told.phase("training", 1, 0)
+        told.advance()
+        time.sleep(0.2)
+        with told.step("report"):
+            time.sleep(0.2)
+    kinds = [line.partition(":")[0] for line in lines_of(console)]
+    assert list(dict.fromkeys(kinds)) == ["preparing", "starting workers", "training", "report"]
+    assert all(kinds.count(kind) > 2 for kind in set(kinds))
+
+
+def test_lines_are_fifteen_seconds_apart_at_most() -> None:
+    assert progress.SECONDS_BETWEEN_LINES + progress.SECONDS_BETWEEN_LOOKS <= 15
+
+
+@pytest.mark.usefixtures("impatient")
+def test_a_step_is_on_the_terminal_while_it_lasts() -> None:
+    console = Console(file=io.StringIO(), width=200, force_terminal=True)
+    with ConsoleProgress(console) as told:
+        with told.step("starting workers"):
+            time.sleep(0.2)
+        assert "starting workers" in "".join(lines_of(console))
+        assert not told._bar.tasks
