@@ -1,15 +1,14 @@
 """The report as one self-contained HTML page: everything it shows is inside the file."""
 
-import base64
 import json
 from html import escape
 from pathlib import Path
-from string import Template
 from typing import Any
 
 import pandas as pd
 
 from analysis.figures.drawn import Drawn
+from analysis.page.frame import asset, badges_html, figure_html, framed
 from analysis.page.profile import TITLE as PROFILE_TITLE
 from analysis.page.profile import profile_section
 from analysis.page.studies import (
@@ -63,7 +62,7 @@ def render_page(
         "figures": (
             "Figures",
             "".join(
-                _figure(figure, figures)
+                figure_html(figure, figures)
                 for figure in drawn
                 if not figure.table and figure.name not in OF_PAIRS + OF_MODELS + OF_STITCHES
             ),
@@ -88,29 +87,13 @@ def render_page(
         "provenance": ("Provenance", _provenance(run.provenance)),
         "reading": ("How to read this", _reading(run, tables)),
     }
-    sections = {name: section for name, section in sections.items() if section[1]}
-    template = Template(_asset("report.html"))
-    return template.substitute(
-        title=escape(run.spec.title),
-        benchmark=escape(run.spec.benchmark),
-        badges=_badges(run, tables),
-        navigation="".join(
-            f'<a href="#{escape(name)}">{escape(title)}</a>'
-            for name, (title, _) in sections.items()
-        ),
-        body="\n".join(
-            f'<section id="{escape(name)}" aria-labelledby="{escape(name)}-title">'
-            f'<h2 id="{escape(name)}-title">{escape(title)}</h2>{content}</section>'
-            for name, (title, content) in sections.items()
-        ),
-        permutations=_permutation_data(run, episodes),
-        style=_asset("report.css"),
-        script=_asset("report.js"),
-    )
-
-
-def _asset(name: str) -> str:
-    return Path(__file__).with_name(name).read_text(encoding="utf-8")
+    data = _permutation_data(run, episodes)
+    scripts = [
+        f'<script type="application/json" id="permutation-data">{data}</script>',
+        f"<script>\n{asset('report.js')}\n</script>",
+    ]
+    title, badges = run.spec.title, _badges(run, tables)
+    return framed(title, run.spec.benchmark, badges, sections, "\n".join(scripts))
 
 
 def _badges(run: Run, tables: list[Table]) -> str:
@@ -121,10 +104,7 @@ def _badges(run: Run, tables: list[Table]) -> str:
         f"{run.spec.episodes} episodes a task, method and seed",
         f"{len(run.spec.tasks):,} tasks",
     ]
-    html = "".join(f'<span class="badge">{escape(badge)}</span>' for badge in badges)
-    if any(table.missing for table in tables):
-        html += '<span class="badge partial">partial</span>'
-    return html
+    return badges_html(badges, partial=any(table.missing for table in tables))
 
 
 def _left_out(run: Run) -> str:
@@ -161,7 +141,7 @@ def _table_section(table: Table, drawn: list[Drawn], figures: Path) -> str:
             f'<p class="notice">{escape(notes.pop(0))}</p>' if table.missing else "",
             scores_html(table),
             *(f'<p class="note">{escape(note)}</p>' for note in notes if note),
-            *(_figure(figure, figures) for figure in drawn if figure.table == table.entry.id),
+            *(figure_html(figure, figures) for figure in drawn if figure.table == table.entry.id),
             claims_html(table),
             gains_html(table),
         ]
@@ -169,21 +149,7 @@ def _table_section(table: Table, drawn: list[Drawn], figures: Path) -> str:
 
 
 def _named(names: tuple[str, ...], drawn: list[Drawn], folder: Path) -> str:
-    return "".join(_figure(figure, folder) for figure in drawn if figure.name in names)
-
-
-def _figure(figure: Drawn, folder: Path) -> str:
-    if figure.missing:
-        return f'<p class="note">{escape(figure.missing)}</p>'
-    # As an image of its own, an SVG's element ids cannot clash with another's.
-    file = folder / figure.files[0]
-    data = base64.b64encode(file.read_bytes()).decode("ascii")
-    kind = "svg+xml" if file.suffix == ".svg" else "png"
-    caption = escape(figure.caption)
-    return (
-        f'<figure><img src="data:image/{kind};base64,{data}" alt="{caption}">'
-        f"<figcaption>{caption}</figcaption></figure>"
-    )
+    return "".join(figure_html(figure, folder) for figure in drawn if figure.name in names)
 
 
 def _single_skills(run: Run) -> str:
