@@ -23,7 +23,7 @@ from sweeps.results.tracking import Tracker
 from sweeps.search import run_search, search_spec
 from sweeps.space import describe
 from sweeps.spec import SweepSpec
-from sweeps.study import RESULT, SweepStudy, feasible
+from sweeps.study import SweepStudy, feasible, result_of
 
 MAY_CHANGE = ("trials", "enqueued", "confirm", "title", "tables")  # under a study that goes on
 
@@ -139,7 +139,7 @@ def winner(directory: RunDirectory, study: SweepStudy) -> Plain:
         "benchmark": spec_of(directory).benchmark,
         "trial": best[0].number,
         "fields": study.fields(best[0]),
-        "search": best[0].user_attrs[RESULT],
+        "search": result_of(best[0]),
         "confirmed": confirmed,
     }
 
@@ -159,7 +159,7 @@ def _write_trials(directory: RunDirectory, study: SweepStudy) -> None:
             "setting": describe(study.fields(trial)),
             "feasible": feasible(trial),
         }
-        | trial.user_attrs[RESULT]
+        | result_of(trial)
         for trial in study.finished
     ]
     directory.write_json("trials.json", trials)

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from orchestrator.errors import StorageError
 from orchestrator.storage.ledger import Ledger
-from sweeps.study import JOURNAL, SweepStudy
+from sweeps.journal import JOURNAL
+from sweeps.study import SweepStudy
 from tests.campaign.ground import Fault, Ground
 from tests.orchestrator.launched import in_a_process, run_serially
 from tests.orchestrator.tiny import Place, blocks_played
