@@ -70,7 +70,9 @@ def sweep(words: list[str], output: Console, errors: Console) -> None:
     with ConsoleProgress(errors) as progress, said_to_users():
         for line in plan_lines(asked, command.store):
             progress.say(line)
-        directory = carry_out(asked, settings, progress, command.results, force=command.force)
+        directory = carry_out(
+            asked, settings, progress, command.results, force=command.force, source=command.spec
+        )
     for line in summary_lines(directory):
         output.print(line, markup=False)
 

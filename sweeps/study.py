@@ -92,8 +92,8 @@ class SweepStudy:
         """Finish trials whose results are all kept, in the order of their numbers."""
         for trial in batch:
             result = result_of(self.trials[trial.number])
-            values = [result.get(expected(name), result[name]) for name in self.sweep.objectives]
-            self.study.tell(trial.number, values)
+            told = [expected(n) if expected(n) in result else n for n in self.sweep.objectives]
+            self.study.tell(trial.number, [result[name] for name in told])
 
     def fields(self, trial: FrozenTrial) -> Fields:
         """A trial's values by field of the run spec, in the space's order."""

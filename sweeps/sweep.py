@@ -12,11 +12,13 @@ from orchestrator.spec.structure import Plain, structure, to_plain
 from orchestrator.storage import locking
 from orchestrator.storage.claim import claim_for_spec, spec_of
 from orchestrator.storage.provenance import provenance
-from orchestrator.storage.rundir import SWEEP, RunDirectory
+from orchestrator.storage.rundir import PLANNED, SWEEP, RunDirectory
 from orchestrator.storage.store import storage_errors
+from orchestrator.work.plan import make_plan
 from orchestrator.work.progress import Progress
 from sweeps.confirm import confirm
 from sweeps.player import CountingExecutor, SpecPlayer
+from sweeps.results.again import SOURCE
 from sweeps.results.report import write_report
 from sweeps.results.table import write_table
 from sweeps.results.tracking import Tracker
@@ -40,25 +42,32 @@ def carry_out(
     results: Path | None = None,
     *,
     force: bool = False,
+    source: str = "",
 ) -> RunDirectory:
     """Search, or go on where an earlier command ended; returns the sweep's directory.
 
     study.journal     the Optuna study, for optuna-dashboard too
     sweep.json        what was asked
+    source.json       the name or file that it was read from
+    plan.json         the artifacts that all trials share
     trials.json       every finished trial with its result
     confirm.json      the best ones on held-out tasks and new seeds
     winner.json       for `skillstitch run … --from-sweep`
     counts.json       what was trained and simulated for it; all else was found
     table/            of a grid: all its points as one run, with the usual tables
-    report/           index.md, trials.csv, confirm.csv, figures
+    report/           index.html, index.md, trials.csv, confirm.csv, figures
+    finished          there when all of the above is
 
-    `results`, `force`: see `write_report`. Raises what a reproduction raises; IncompleteError
-    loses nothing.
+    `results`, `force`: see `write_report`. source: by default its name. Raises what a reproduction
+    raises; IncompleteError loses nothing.
     """
     directory = RunDirectory(settings.out)
     with directory.locked(), locking.shared(settings.store, progress.say):
         run_id = claim_for_spec(directory, search_spec(sweep))
         settle(directory, sweep)
+        directory.mark(finished=False)
+        directory.write_json(SOURCE, source or sweep.name)
+        directory.write_json(PLANNED, _shared_artifacts(sweep))
         directory.uses(settings.store)
         study = SweepStudy(sweep, directory.path)
         if study.cut:
@@ -85,6 +94,7 @@ def carry_out(
                         write_table(sweep, player, directory.path / "table")
                 _write_counts(directory, player.executor, earlier)
                 write_report(sweep, study, directory, results, force=force)
+                directory.mark(finished=True)
             finished = True
         finally:
             _write_counts(directory, player.executor, earlier)
@@ -109,7 +119,7 @@ def report_again(directory: RunDirectory, results: Path | None, *, force: bool =
 
 def settle(directory: RunDirectory, sweep: SweepSpec) -> None:
     """Claim the directory for a sweep, or check that its study is of the same one."""
-    asked = json.loads(json.dumps(to_plain(sweep)))
+    asked = json.loads(json.dumps(to_plain(sweep))) | {"trials": sweep.budget}
     before = directory.asked_sweep() or asked
     changed = [
         f"{name}: {before.get(name)!r} → {value!r}"
@@ -122,6 +132,13 @@ def settle(directory: RunDirectory, sweep: SweepSpec) -> None:
             "shared), or go back to:\n  " + "\n  ".join(changed)
         )
     directory.write_json(SWEEP, asked)
+
+
+def _shared_artifacts(sweep: SweepSpec) -> Plain:
+    """What `skillstitch status` counts: nothing where every trial has models of its own."""
+    plan = make_plan(search_spec(sweep))
+    shared = plan.needed if sweep.question.shared else ()
+    return {"artifacts": [[plan.recipes[key].kind, key] for key in sorted(shared)]}
 
 
 def winner(directory: RunDirectory, study: SweepStudy) -> Plain:
