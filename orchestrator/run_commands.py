@@ -78,7 +78,7 @@ def report(words: list[str], output: Console, errors: Console) -> None:
 
             with said_to_users():
                 sweep_report_again(directory, results, force=force)
-            output.print(f"wrote {run / 'report' / 'index.md'}", markup=False)
+            output.print(f"wrote {run / 'report' / 'index.html'}", markup=False)
             return
         for line in report_again(run, results, force=force):
             output.print(line, markup=False)

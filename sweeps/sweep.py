@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 from analysis.schema import PROVENANCE
@@ -112,6 +113,9 @@ def report_again(directory: RunDirectory, results: Path | None, *, force: bool =
     sweep = structure(SweepSpec, directory.asked_sweep(), str(directory.path / SWEEP))
     with directory.locked(), storage_errors(directory.path):
         study = SweepStudy(sweep, directory.path)
+        if study.trials:  # whose fields are in the order asked; those of sweep.json are sorted
+            space = {path: sweep.space[path] for path in study.trials[0].params}
+            study.sweep = sweep = replace(sweep, space=space)
         _write_trials(directory, study)
         winner(directory, study)
         write_report(sweep, study, directory, results, force=force)

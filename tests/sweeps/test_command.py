@@ -20,7 +20,8 @@ from orchestrator.storage.rundir import RunDirectory
 from orchestrator.work.progress import Silent
 from sweeps import winner as winners
 from sweeps.candidates import method_of
-from sweeps.results.figures import draw_figures, paper_gains
+from sweeps.results.alpha_beta import paper_gains
+from sweeps.results.figures import draw_figures
 from sweeps.scoring import pareto_front
 from sweeps.search import run_search
 from sweeps.space import Dimension
@@ -48,7 +49,7 @@ def test_what_a_user_sees(done: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert "## Winner" in out
     assert "Judged again on 2 held-out tasks by new seeds (1; root seed 0)" in out
     assert "Over the base's own setting it gains **" in out
-    assert f"report: {done / 'sweep' / 'report' / 'index.md'}" in out
+    assert f"report: {done / 'sweep' / 'report' / 'index.html'}" in out
     figures = {path.name for path in (done / "sweep" / "report" / "figures").glob("*.svg")}
     assert figures == {"history.svg", "importances.svg", "slices.svg", "alpha-beta.svg"}
 
@@ -63,7 +64,7 @@ def test_a_report_is_written_again(done: Path, capsys: pytest.CaptureFixture[str
     (sweep / "trials.json").unlink()
     shutil.rmtree(results)
     main(["report", str(sweep), "--results", str(results)])
-    assert capsys.readouterr().out == f"wrote {sweep / 'report' / 'index.md'}\n"
+    assert capsys.readouterr().out == f"wrote {sweep / 'report' / 'index.html'}\n"
     assert {path.name: path.read_bytes() for path in (sweep / "report").glob("*.*")} == before
     (exported,) = results.iterdir()
     assert (exported / "index.md").read_bytes() == before["index.md"]
@@ -236,7 +237,7 @@ def test_every_figure_can_be_drawn(tmp_path: Path) -> None:
     worse = trial | {"trial": 2, "pruned": True, "imagined": 30.0}
     sweep = tiny_sweep(sampler="grid", space=GRID, objectives=("gain", "imagined"))
     drawn = draw_figures(sweep, [trial, other, worse], {ALPHA: 0.7, BETA: 0.3}, tmp_path)
-    assert drawn == [
+    assert [figure.name for figure in drawn] == [
         "history", "importances", "slices", "pareto", "alpha-beta", "alpha-beta-tasks",
     ]  # fmt: skip
     assert [one["trial"] for one in pareto_front([trial, other, worse])] == [0, 1]

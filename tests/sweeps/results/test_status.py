@@ -63,7 +63,7 @@ def test_a_finished_sweep_tells_what_it_has_found(
     assert f"[{low:+.3f}, {high:+.3f}], alpha " in lines["best"]
     assert f"gain {winner['confirmed']['gain']:+.3f} [" in lines["confirmed"]
     assert lines["confirmed"].endswith("on 2 held-out tasks, by new seeds")
-    assert lines["report"] == str(done / "sweep" / "report" / "index.md")
+    assert lines["report"] == str(done / "sweep" / "report" / "index.html")
     assert lines["next"].startswith("with the winner: skillstitch run ")
     assert lines["next"].endswith(f"--from-sweep {done / 'sweep'}")
 
