@@ -1,6 +1,7 @@
 """The commands a user types, and what is written for them."""
 
 import json
+import shlex
 import shutil
 from collections.abc import Iterator
 from dataclasses import replace
@@ -26,6 +27,7 @@ from sweeps.scoring import pareto_front
 from sweeps.search import run_search
 from sweeps.space import Dimension
 from sweeps.spec import Confirm, load_sweep
+from sweeps.study import SweepStudy
 from sweeps.sweep import carry_out
 from tests.orchestrator.tiny import TINY, Lines
 from tests.sweeps.tiny import TINY_SWEEP, settings, sweep_in, tiny_sweep
@@ -133,6 +135,30 @@ def test_a_sweep_knows_its_store_and_uses_it_beside_others(
     main(command(done))
     assert searched == ["once"]
     assert RunDirectory(done / "sweep").store_root == (done / "store").resolve()
+
+
+def test_a_path_may_have_characters_that_mean_something_in_addresses(
+    trained: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Search, status, list, report and export; and nothing is written elsewhere."""
+    root = tmp_path / "here" / "a #b?c=1&d %41"
+    shutil.copytree(trained / "store", root / "store")
+    with mock.patch("sweeps.results.report.draw_figures", return_value=[]):
+        main(command(root, "--trials", "3"))
+        main(["report", str(root / "sweep")])
+    capsys.readouterr()
+    main(["status", str(root / "sweep")])
+    assert "3 of 3 finished" in capsys.readouterr().out
+    main(["list", str(tmp_path / "here")])
+    assert "finished, 3 of 3 trials" in capsys.readouterr().out
+    assert len(SweepStudy(tiny_sweep(trials=3), root / "sweep").finished) == 3
+    (root / "sweep" / "finished").unlink()
+    main(["status", str(root / "sweep")])
+    *_, again = capsys.readouterr().out.splitlines()
+    words = shlex.split(again.partition("skillstitch ")[2])
+    assert words[words.index("--out") + 1] == str(root / "sweep")
+    assert {path.name for path in root.iterdir()} == {"sweep", "store", "results"}
+    assert [path.name for path in root.parent.iterdir()] == [root.name]
 
 
 def test_the_plan_alone_runs_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
