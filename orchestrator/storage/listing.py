@@ -12,6 +12,7 @@ from orchestrator.errors import StorageError, UsageError
 from orchestrator.storage.rundir import RunDirectory
 
 STORE = "blocks.sqlite"
+COPIES = "mlartifacts"  # MLflow's, of files of runs
 
 
 def listing_lines(root: Path, sweep_state: Callable[[RunDirectory], str]) -> Iterator[str]:
@@ -36,8 +37,8 @@ def _run_folders(root: Path) -> Iterator[Path]:
     for folder, below, files in os.walk(root):
         if SPEC in files:
             yield Path(folder)
-        if SPEC in files or STORE in files:
-            below.clear()
+        stays = SPEC not in files and STORE not in files
+        below[:] = [name for name in below if stays and name != COPIES]
 
 
 def _row(folder: Path, sweep_state: Callable[[RunDirectory], str]) -> tuple[str, str, str, str]:

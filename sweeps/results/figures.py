@@ -19,6 +19,8 @@ from sweeps.results.axes import place, span
 from sweeps.scoring import pareto_front
 from sweeps.spec import SweepSpec
 
+SAME = 1e-6  # scores closer than this are one
+
 CAPTIONS = {
     "history": "Every trial, with its 95 % interval where it has one, and the best so far among "
     "those that were played in full and keep to the constraints.",
@@ -122,6 +124,9 @@ def slices(sweep: SweepSpec, trials: Sequence[Plain]) -> Figure:
             )  # fmt: skip
         axes.axhline(0, color=INK, lw=0.6)
         axes.set_xlabel(_label(path))
+    numbers = [0.0, *(trial[main] for trial in trials)]
+    if max(numbers) - min(numbers) < SAME:  # else the axis would show rounding errors
+        grid[0, 0].set_ylim(min(numbers) - 0.05, max(numbers) + 0.05)
     for axes in grid[:, 0]:
         axes.set_ylabel(METRICS[main].label)
     return figure

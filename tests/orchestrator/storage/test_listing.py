@@ -28,6 +28,7 @@ def test_every_run_has_a_line(finished: Place, tmp_path: Path) -> None:
     (runs / "damaged" / "spec.json").write_text("{")
     shutil.copytree(finished.out, runs / "store" / "agent" / "key")
     (runs / "store" / "blocks.sqlite").touch()
+    shutil.copytree(finished.out, runs / "mlartifacts" / "0123" / "artifacts")
     damaged, stopped, whole = listing_lines(runs, told)
     assert "unreadable" in damaged
     assert stopped.startswith(str(runs / "deep" / "stopped"))

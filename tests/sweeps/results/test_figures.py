@@ -47,6 +47,14 @@ def test_ticks_of_a_searched_field_are_plain_numbers_side_by_side() -> None:
     assert not any(one.overlaps(two) for one, two in pairwise(boxes))
 
 
+def test_equal_trials_show_no_rounding_errors() -> None:
+    """A first sweep at smoke scale gains nothing anywhere."""
+    space = {ALPHA: Dimension(low=2.0, high=40.0, log=True)}
+    equal = [trial | {"gain": 1e-18} for trial in trials(4, **{ALPHA: 3.0})]
+    (axes,) = slices(tiny_sweep(space=space), equal).axes
+    assert axes.get_ylim() == pytest.approx((-0.05, 0.05))
+
+
 def test_a_field_is_shown_over_the_range_that_was_searched() -> None:
     sweep = load_sweep("kitchen-data", "quick")
     one = trials(2, **{path: dimension.ends[0] for path, dimension in sweep.space.items()})
