@@ -15,7 +15,7 @@ from orchestrator.spec.structure import Plain
 from orchestrator.storage.rundir import PLANNED, RunDirectory
 from orchestrator.storage.store import Store
 from sweeps.journal import JOURNAL, entries
-from sweeps.results.again import command_here
+from sweeps.results.again import SOURCE, command_here
 
 CREATED, ASKED, TOLD = 0, 4, 6  # operations of Optuna's journal: a study, a trial, its end
 MINIMISED = 1  # a direction, in Optuna's numbers
@@ -62,8 +62,15 @@ def progress_of(directory: RunDirectory) -> Progress:
         directory.read_json("trials.json") or [],
         count[ASKED] - count[TOLD],
         direction != MINIMISED,
-        directory.written,
+        _written(directory),
     )
+
+
+def _written(directory: RunDirectory) -> bool:
+    if (directory.path / SOURCE).is_file():
+        return directory.written
+    # An earlier version's, which left no mark; it chose the winner after confirmation.
+    return (directory.path / "winner.json").is_file()
 
 
 def state(directory: RunDirectory) -> str:

@@ -11,7 +11,7 @@ import pytest
 from orchestrator.cli import main
 from orchestrator.storage.rundir import RunDirectory
 from sweeps.journal import JOURNAL, entries
-from sweeps.results.status import ASKED, TOLD, progress_of
+from sweeps.results.status import ASKED, TOLD, progress_of, state
 from sweeps.space import Dimension
 from sweeps.spec import Confirm
 from sweeps.study import SweepStudy
@@ -134,6 +134,14 @@ def test_a_grid_has_as_many_trials_as_points(
     lines = told(sweep_in(trained, sweep).path, capsys)
     assert lines["trials"] == "2 of 2 finished"
     assert lines["confirmed"].startswith("not asked for; ")
+
+
+def test_one_of_an_earlier_version_is_finished_when_it_has_a_winner(done: Path) -> None:
+    for name in ("finished", "source.json"):
+        (done / "sweep" / name).unlink()
+    assert state(RunDirectory(done / "sweep")) == "finished, 10 of 10 trials"
+    (done / "sweep" / "winner.json").unlink()
+    assert state(RunDirectory(done / "sweep")) == "unfinished, 10 of 10 trials"
 
 
 def test_before_anything_was_played(tmp_path: Path, done: Path) -> None:
