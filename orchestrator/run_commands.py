@@ -17,14 +17,20 @@ def status(words: list[str], output: Console, errors: Console) -> None:
     from orchestrator.tracking.run import catch_up
 
     def status(run: tyro.conf.Positional[Path], store: Path | None = None) -> None:
-        """How far a run directory is.
+        """How far a run or a sweep is.
 
         Args:
-            run: the run directory.
+            run: the directory of the run or sweep.
             store: where its artifacts are kept; default: where it was last carried out.
         """
         directory = RunDirectory(run)
-        for line in status_lines(directory, store):
+        if directory.asked_sweep():
+            from sweeps.results.status import sweep_lines
+
+            lines = sweep_lines(directory, store)
+        else:
+            lines = status_lines(directory, store)
+        for line in lines:
             output.print(line, markup=False)
         for each in (*directory.parts.values(), directory):
             if trouble := catch_up(each):
@@ -36,6 +42,7 @@ def status(words: list[str], output: Console, errors: Console) -> None:
 def list_runs(words: list[str], output: Console, errors: Console) -> None:
     """`skillstitch list [FOLDER]`."""
     from orchestrator.storage.listing import listing_lines
+    from sweeps.results.status import state
 
     def list_(folder: tyro.conf.Positional[Path] = Path("runs")) -> None:
         """Every run and sweep in a folder: what was asked, how far it is, when it last went on.
@@ -43,7 +50,7 @@ def list_runs(words: list[str], output: Console, errors: Console) -> None:
         Args:
             folder: the folder.
         """
-        for line in listing_lines(folder):
+        for line in listing_lines(folder, state):
             output.print(line, markup=False)
 
     tyro.cli(list_, args=words, prog="skillstitch list")
@@ -71,7 +78,7 @@ def report(words: list[str], output: Console, errors: Console) -> None:
 
             with said_to_users():
                 sweep_report_again(directory, results, force=force)
-            output.print(f"wrote {run / 'report' / 'index.md'}", markup=False)
+            output.print(f"wrote {run / 'report' / 'index.html'}", markup=False)
             return
         for line in report_again(run, results, force=force):
             output.print(line, markup=False)

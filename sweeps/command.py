@@ -18,7 +18,7 @@ from orchestrator.storage.rundir import RunDirectory
 from orchestrator.storage.store import USUAL_STORE
 from orchestrator.work.progress import ConsoleProgress
 from sweeps.costs import plan_lines
-from sweeps.results.report import results_names
+from sweeps.results.report import results_names, summary
 from sweeps.spec import load_sweep, packaged_sweeps
 from sweeps.sweep import carry_out, default_out
 
@@ -70,13 +70,16 @@ def sweep(words: list[str], output: Console, errors: Console) -> None:
     with ConsoleProgress(errors) as progress, said_to_users():
         for line in plan_lines(asked, command.store):
             progress.say(line)
-        directory = carry_out(asked, settings, progress, command.results, force=command.force)
+        directory = carry_out(
+            asked, settings, progress, command.results, force=command.force, source=command.spec
+        )
     for line in summary_lines(directory):
         output.print(line, markup=False)
 
 
 def summary_lines(directory: RunDirectory) -> Iterator[str]:
-    """The report of a sweep, and where it is."""
-    yield (directory.path / "report" / "index.md").read_text().strip()
+    """What a sweep found, and where its report is."""
+    report = directory.path / "report"
+    yield summary((report / "index.md").read_text(encoding="utf-8"))
     yield ""
-    yield f"report: {directory.path / 'report' / 'index.md'}"
+    yield f"report: {report / 'index.html'}"

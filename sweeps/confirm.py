@@ -9,7 +9,7 @@ from orchestrator.spec.structure import Plain
 from sweeps.player import SpecPlayer
 from sweeps.space import describe
 from sweeps.spec import SweepSpec, base_spec, split_tasks
-from sweeps.study import RESULT, SweepStudy
+from sweeps.study import SweepStudy, result_of
 
 
 def confirm_spec(sweep: SweepSpec) -> tuple[Spec, tuple[int, ...]]:
@@ -49,7 +49,7 @@ def confirm(sweep: SweepSpec, study: SweepStudy, player: SpecPlayer) -> Plain:
     rows = []
     for trial, measured in zip(best, all_measured, strict=True):
         names = (sweep.name, "confirm", str(trial.number))
-        again = sweep.question.again(trial.user_attrs[RESULT], measured, base, *names)
+        again = sweep.question.again(result_of(trial), measured, base, *names)
         rows.append(
             {
                 "trial": trial.number,

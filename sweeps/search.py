@@ -18,7 +18,7 @@ from sweeps.player import SpecPlayer
 from sweeps.questions.question import Measured
 from sweeps.space import describe
 from sweeps.spec import SweepSpec, base_spec, split_tasks
-from sweeps.study import RESULT, SweepStudy, expected, wilcoxon
+from sweeps.study import SweepStudy, expected, is_kept, result_of, wilcoxon
 
 
 def search_spec(sweep: SweepSpec) -> Spec:
@@ -62,7 +62,7 @@ def run_search(
     progress.phase("trials", sweep.budget, len(study.finished))
     while batch := study.next_batch():
         # With some of a batch told, the others' results are there: they were kept before.
-        unplayed = [trial for trial in batch if RESULT not in trial.user_attrs]
+        unplayed = [trial for trial in batch if not is_kept(trial)]
         _play_batch(sweep, spec, study, unplayed, player)
         study.tell(batch)
         for trial in batch:
@@ -131,14 +131,14 @@ def _expected_gain(study: SweepStudy, result: Plain) -> float:
     ranked = study.ranked()
     if not ranked:  # nothing keeps to the constraints yet
         return float(result["gain"])
-    best = ranked[0].user_attrs[RESULT]
+    best = result_of(ranked[0])
     behind = [gain - best["tasks"][task] for task, gain in result["tasks"].items()]
     return float(best["gain"] + np.mean(behind))
 
 
 def trial_line(study: SweepStudy, trial: FrozenTrial) -> str:
     """ "trial 7: gain +0.213 [+0.150, +0.270], alpha 3.1, beta 0.5" """
-    result = trial.user_attrs[RESULT]
+    result = result_of(trial)
     best: Sequence[FrozenTrial] = study.ranked()[:1]
     note = " · best so far" if best and best[0].number == trial.number else ""
     note = f" · given up after round {result['rounds']}" if result["pruned"] else note

@@ -15,7 +15,7 @@ from orchestrator.spec.spec import (
     spec_from_plain,
 )
 from orchestrator.spec.structure import Plain, merged, settings_of, structure, to_plain
-from orchestrator.spec.tomls import Scale, load_toml, toml_names
+from orchestrator.spec.tomls import Scale, at_scale, read_toml, toml_names
 from stitching.bounds import (
     Amount,
     Bounded,
@@ -197,10 +197,14 @@ def packaged_sweeps() -> list[str]:
 def load_sweep(name_or_file: str, scale: Scale = "paper", trials: int | None = None) -> SweepSpec:
     """A packaged sweep by name, or any TOML file, at one of its scales.
 
-    A base that is a file is looked for beside the sweep's own. Raises UsageError listing what is
-    valid.
+    A base that is a file is looked for beside the sweep's own. Scales are the base's, and need not
+    be said again. Raises UsageError listing what is valid.
     """
-    content, where = load_toml(name_or_file, scale, PACKAGED, "sweep")
+    content, where = read_toml(name_or_file, PACKAGED, "sweep")
+    own = content.get("scales", {})
+    if isinstance(own, dict):  # else `at_scale` refuses it
+        content["scales"] = {scale: {}} | own
+    content = at_scale(content, scale, where)
     if trials is not None:
         content["trials"] = trials
     base, folder = content.get("base"), Path(where).parent

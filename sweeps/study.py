@@ -8,7 +8,6 @@ process was killed or how many workers there are.
 
 from __future__ import annotations
 
-import json
 import logging
 import warnings
 from collections.abc import Mapping
@@ -25,46 +24,17 @@ from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock
 from optuna.study import StudyDirection
 from optuna.trial import FrozenTrial, TrialState, create_trial
 
-from orchestrator.errors import ChangedError, StorageError
+from orchestrator.errors import ChangedError
+from orchestrator.spec.structure import Plain
 from orchestrator.storage.store import storage_errors
 from stitching.streams import stream
+from sweeps.journal import JOURNAL, repair
 from sweeps.questions import METRICS
 from sweeps.space import Fields, current, describe
 from sweeps.spec import SweepSpec, base_spec
 
-RESULT = "result"  # user attribute: a trial's metrics, there before any of its batch is told
-JOURNAL = "study.journal"
+LAST = "method"  # user attribute that is written last: with it all of a trial's metrics are there
 STALE_SECONDS = 3  # an append takes milliseconds: a lock held for longer was left by a kill
-
-
-def repair(path: Path) -> int:
-    """Cut a torn last line, which a kill can leave, from a journal; returns the bytes cut.
-
-    Optuna appends behind it otherwise, and nothing can be read any more. Raises StorageError for
-    damage elsewhere, and for a file that cannot be written.
-    """
-    with storage_errors(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("ab"):  # refused here, before anything is played for nothing
-            pass
-        data = path.read_bytes()
-        whole = data[: data.rfind(b"\n") + 1]
-        for number, line in enumerate(whole.splitlines(), start=1):
-            _check_line(path, number, line)
-        if len(whole) < len(data):
-            with path.open("r+b") as file:
-                file.truncate(len(whole))
-    return len(data) - len(whole)
-
-
-def _check_line(path: Path, number: int, line: bytes) -> None:
-    try:
-        json.loads(line)
-    except ValueError as error:
-        raise StorageError(
-            f"{path}, line {number}: damaged ({error}); restore the file, or move it away: the "
-            "same command then asks the same trials again and finds the blocks they have played"
-        ) from error
 
 
 class SweepStudy:
@@ -105,19 +75,25 @@ class SweepStudy:
         return optuna.Trial(self.study, trial._trial_id)
 
     def keep(self, trial: FrozenTrial, result: Mapping[str, Any]) -> None:
-        """Write a trial's metrics down, and whether it keeps to the constraints."""
+        """Write a trial's metrics down, and whether it keeps to the constraints.
+
+        Each is a user attribute, so that dashboards show it as a column; what a killed process has
+        written already stays.
+        """
         handle = self.handle(trial)
         for metric, most in self.sweep.constraints.items():
             if metric not in trial.constraints:
                 handle.set_constraint(metric, result[metric] - most)
-        handle.set_user_attr(RESULT, dict(result))
+        for name in [*(name for name in result if name != LAST), LAST]:
+            if name not in trial.user_attrs or trial.user_attrs[name] != result[name]:
+                handle.set_user_attr(name, result[name])
 
     def tell(self, batch: list[FrozenTrial]) -> None:
         """Finish trials whose results are all kept, in the order of their numbers."""
         for trial in batch:
-            result = self.trials[trial.number].user_attrs[RESULT]
-            values = [result.get(expected(name), result[name]) for name in self.sweep.objectives]
-            self.study.tell(trial.number, values)
+            result = result_of(self.trials[trial.number])
+            told = [expected(n) if expected(n) in result else n for n in self.sweep.objectives]
+            self.study.tell(trial.number, [result[name] for name in told])
 
     def fields(self, trial: FrozenTrial) -> Fields:
         """A trial's values by field of the run spec, in the space's order."""
@@ -129,7 +105,7 @@ class SweepStudy:
         By the first objective; of equals, the earlier one is the better.
         """
         sign = -1 if METRICS[self.sweep.objectives[0]].maximised else 1
-        kept = [t for t in self.finished if feasible(t) and not t.user_attrs[RESULT]["pruned"]]
+        kept = [t for t in self.finished if feasible(t) and not result_of(t)["pruned"]]
         return sorted(kept, key=lambda trial: (sign * trial.values[0], trial.number))
 
     def _check_enqueued(self) -> None:
@@ -193,6 +169,17 @@ def _open(storage: JournalStorage, sweep: SweepSpec) -> optuna.Study:
         warnings.simplefilter("ignore", ExperimentalWarning)
         study.set_metric_names(list(sweep.objectives))  # what dashboards call them
     return study
+
+
+def result_of(trial: FrozenTrial) -> Plain:
+    """A trial's metrics, as far as they were written down."""
+    # In journals of earlier versions all of them are one attribute.
+    return dict(trial.user_attrs.get("result", trial.user_attrs))
+
+
+def is_kept(trial: FrozenTrial) -> bool:
+    """Whether all of a trial's metrics are written down, though it may not have been told."""
+    return LAST in result_of(trial)
 
 
 def expected(metric: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from analysis.schema import PROVENANCE
@@ -14,18 +15,20 @@ from orchestrator.spec.structure import Plain, structure, to_plain
 from orchestrator.storage import locking
 from orchestrator.storage.claim import claim_for_spec, spec_of
 from orchestrator.storage.provenance import provenance
-from orchestrator.storage.rundir import SWEEP, RunDirectory
+from orchestrator.storage.rundir import PLANNED, SWEEP, RunDirectory
 from orchestrator.storage.store import storage_errors
+from orchestrator.work.plan import make_plan
 from orchestrator.work.progress import Progress
 from sweeps.confirm import confirm
 from sweeps.player import CountingExecutor, SpecPlayer
+from sweeps.results.again import SOURCE
 from sweeps.results.report import write_report
 from sweeps.results.table import write_table
 from sweeps.results.tracking import Tracker
 from sweeps.search import run_search, search_spec
 from sweeps.space import describe
 from sweeps.spec import SweepSpec
-from sweeps.study import RESULT, SweepStudy, feasible
+from sweeps.study import SweepStudy, feasible, result_of
 
 MAY_CHANGE = ("trials", "enqueued", "confirm", "title", "tables")  # under a study that goes on
 
@@ -42,25 +45,32 @@ def carry_out(
     results: Path | None = None,
     *,
     force: bool = False,
+    source: str = "",
 ) -> RunDirectory:
     """Search, or go on where an earlier command ended; returns the sweep's directory.
 
     study.journal     the Optuna study, for optuna-dashboard too
     sweep.json        what was asked
+    source.json       the name or file that it was read from
+    plan.json         the artifacts that all trials share
     trials.json       every finished trial with its result
     confirm.json      the best ones on held-out tasks and new seeds
     winner.json       for `skillstitch run … --from-sweep`
     counts.json       what was trained and simulated for it; all else was found
     table/            of a grid: all its points as one run, with the usual tables
-    report/           index.md, trials.csv, confirm.csv, figures
+    report/           index.html, index.md, trials.csv, confirm.csv, figures
+    finished          there when all of the above is
 
-    `results`, `force`: see `write_report`. Raises what a reproduction raises; IncompleteError
-    loses nothing.
+    `results`, `force`: see `write_report`. source: by default its name. Raises what a reproduction
+    raises; IncompleteError loses nothing.
     """
     directory = RunDirectory(settings.out)
     with directory.locked(), locking.shared(settings.store, progress.say):
         run_id = claim_for_spec(directory, search_spec(sweep))
         settle(directory, sweep)
+        directory.mark(finished=False)
+        directory.write_json(SOURCE, source or sweep.name)
+        directory.write_json(PLANNED, _shared_artifacts(sweep))
         directory.uses(settings.store)
         study = SweepStudy(sweep, directory.path)
         if study.cut:
@@ -89,6 +99,7 @@ def carry_out(
                     write_table(sweep, player, directory.path / "table")
             _write_counts(directory, player.executor, earlier)
             write_report(sweep, study, directory, results, force=force)
+            directory.mark(finished=True)
     return directory
 
 
@@ -100,6 +111,9 @@ def report_again(directory: RunDirectory, results: Path | None, *, force: bool =
     sweep = structure(SweepSpec, directory.asked_sweep(), str(directory.path / SWEEP))
     with directory.locked(), storage_errors(directory.path):
         study = SweepStudy(sweep, directory.path)
+        if study.trials:  # whose fields are in the order asked; those of sweep.json are sorted
+            space = {path: sweep.space[path] for path in study.trials[0].params}
+            study.sweep = sweep = replace(sweep, space=space)
         _write_trials(directory, study)
         winner(directory, study)
         write_report(sweep, study, directory, results, force=force)
@@ -107,7 +121,7 @@ def report_again(directory: RunDirectory, results: Path | None, *, force: bool =
 
 def settle(directory: RunDirectory, sweep: SweepSpec) -> None:
     """Claim the directory for a sweep, or check that its study is of the same one."""
-    asked = json.loads(json.dumps(to_plain(sweep)))
+    asked = json.loads(json.dumps(to_plain(sweep))) | {"trials": sweep.budget}
     before = directory.asked_sweep() or asked
     changed = [
         f"{name}: {before.get(name)!r} → {value!r}"
@@ -120,6 +134,13 @@ def settle(directory: RunDirectory, sweep: SweepSpec) -> None:
             "shared), or go back to:\n  " + "\n  ".join(changed)
         )
     directory.write_json(SWEEP, asked)
+
+
+def _shared_artifacts(sweep: SweepSpec) -> Plain:
+    """What `skillstitch status` counts: nothing where every trial has models of its own."""
+    plan = make_plan(search_spec(sweep))
+    shared = plan.needed if sweep.question.shared else ()
+    return {"artifacts": [[plan.recipes[key].kind, key] for key in sorted(shared)]}
 
 
 def winner(directory: RunDirectory, study: SweepStudy) -> Plain:
@@ -137,7 +158,7 @@ def winner(directory: RunDirectory, study: SweepStudy) -> Plain:
         "benchmark": spec_of(directory).benchmark,
         "trial": best[0].number,
         "fields": study.fields(best[0]),
-        "search": best[0].user_attrs[RESULT],
+        "search": result_of(best[0]),
         "confirmed": confirmed,
     }
 
@@ -157,7 +178,7 @@ def _write_trials(directory: RunDirectory, study: SweepStudy) -> None:
             "setting": describe(study.fields(trial)),
             "feasible": feasible(trial),
         }
-        | trial.user_attrs[RESULT]
+        | result_of(trial)
         for trial in study.finished
     ]
     directory.write_json("trials.json", trials)

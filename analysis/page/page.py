@@ -3,7 +3,6 @@
 import json
 from html import escape
 from pathlib import Path
-from string import Template
 from typing import Any
 
 import pandas as pd
@@ -11,6 +10,7 @@ import pandas as pd
 from analysis.figures.drawn import Drawn
 from analysis.page.distribution import distribution_html
 from analysis.page.figures import figure_html, named_figures
+from analysis.page.frame import asset, badges_html, framed
 from analysis.page.origin import TITLE as AGAIN
 from analysis.page.origin import origin_section
 from analysis.page.profile import TITLE as PROFILE_TITLE
@@ -93,33 +93,17 @@ def render_page(
         "provenance": ("Provenance", _provenance(run.provenance)),
         "reading": ("How to read this", _reading(run, tables)),
     }
-    sections = {
-        name: (title, content + section_links(name, studies))
+    linked = {
+        name: (title, content + section_links(name, studies) if content else "")
         for name, (title, content) in sections.items()
-        if content
     }
-    template = Template(_asset("report.html"))
-    return template.substitute(
-        title=escape(run.spec.title),
-        benchmark=escape(run.spec.benchmark),
-        badges=_badges(run, tables),
-        navigation="".join(
-            f'<a href="#{escape(name)}">{escape(title)}</a>'
-            for name, (title, _) in sections.items()
-        ),
-        body="\n".join(
-            f'<section id="{escape(name)}" aria-labelledby="{escape(name)}-title">'
-            f'<h2 id="{escape(name)}-title">{escape(title)}</h2>{content}</section>'
-            for name, (title, content) in sections.items()
-        ),
-        permutations=_permutation_data(run, episodes),
-        style=_asset("report.css"),
-        script=_asset("report.js"),
-    )
-
-
-def _asset(name: str) -> str:
-    return Path(__file__).with_name(name).read_text(encoding="utf-8")
+    data = _permutation_data(run, episodes)
+    scripts = [
+        f'<script type="application/json" id="permutation-data">{data}</script>',
+        f"<script>\n{asset('report.js')}\n</script>",
+    ]
+    title, badges = run.spec.title, _badges(run, tables)
+    return framed(title, run.spec.benchmark, badges, linked, "\n".join(scripts))
 
 
 def _badges(run: Run, tables: list[Table]) -> str:
@@ -130,10 +114,7 @@ def _badges(run: Run, tables: list[Table]) -> str:
         f"{run.spec.episodes} episodes a task, method and seed",
         f"{len(run.spec.tasks):,} tasks",
     ]
-    html = "".join(f'<span class="badge">{escape(badge)}</span>' for badge in badges)
-    if any(table.missing for table in tables):
-        html += '<span class="badge partial">partial</span>'
-    return html
+    return badges_html(badges, partial=any(table.missing for table in tables))
 
 
 def _left_out(run: Run) -> str:

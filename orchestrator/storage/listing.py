@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
 from analysis.schema import QUARANTINE, SPEC
 from orchestrator.errors import StorageError, UsageError
-from orchestrator.spec.structure import Plain
 from orchestrator.storage.rundir import RunDirectory
 
 STORE = "blocks.sqlite"
+COPIES = "mlartifacts"  # MLflow's, of files of runs
 
 
-def listing_lines(root: Path) -> Iterator[str]:
+def listing_lines(root: Path, sweep_state: Callable[[RunDirectory], str]) -> Iterator[str]:
     """Each run, suite and sweep below `root`: where, what, how far, and when it last went on.
 
+    sweep_state: how far a sweep is, which only sweeps know.
     Raises UsageError where there is no such folder.
     """
     if not root.is_dir():
         raise UsageError(f"{root} is no folder; name the one that your runs are in")
-    rows = [_row(folder) for folder in sorted(_run_folders(root))]
+    rows = [_row(folder, sweep_state) for folder in sorted(_run_folders(root))]
     if not rows:
         yield f"no run in {root}"
         return
@@ -36,26 +37,22 @@ def _run_folders(root: Path) -> Iterator[Path]:
     for folder, below, files in os.walk(root):
         if SPEC in files:
             yield Path(folder)
-        if SPEC in files or STORE in files:
-            below.clear()
+        stays = SPEC not in files and STORE not in files
+        below[:] = [name for name in below if stays and name != COPIES]
 
 
-def _row(folder: Path) -> tuple[str, str, str, str]:
+def _row(folder: Path, sweep_state: Callable[[RunDirectory], str]) -> tuple[str, str, str, str]:
     directory = RunDirectory(folder)
     try:
         sweep = directory.asked_sweep()
         asked = sweep or directory.asked()
         what = f"{asked['name']} at {asked['scale']} scale"
-        state = _progress(directory, sweep) if sweep else _state(directory)
+        state = sweep_state(directory) if sweep else _state(directory)
     except (StorageError, KeyError):
         what, state = "unreadable", "its spec.json is damaged, or of another version"
     newest = max(path.stat().st_mtime for path in folder.iterdir())
     when = datetime.fromtimestamp(newest, UTC).strftime("%Y-%m-%d %H:%M UTC")
     return str(folder), what, state, when
-
-
-def _progress(directory: RunDirectory, sweep: Plain) -> str:
-    return f"{len(directory.read_json('trials.json') or [])} of {sweep['trials']} trials"
 
 
 def _state(directory: RunDirectory) -> str:

@@ -102,8 +102,6 @@ class GainQuestion(Question[MeasuredGain]):
         several = len(objectives) > 1
         shown = pareto_front(ranked) if several else ranked[:SHOWN]
         imagined = self.metrics["imagined"].label.capitalize()
-        yield "## Pareto front" if several else "## Best trials in the search"
-        yield ""
         yield f"| Trial | Setting | Gain | Score | No-Stitch | {imagined} |"
         yield "| --- | --- | --- | --- | --- | --- |"
         for trial in shown:

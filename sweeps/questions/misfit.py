@@ -132,8 +132,6 @@ class MisfitQuestion(Question[Profiled]):
         yield from _profiles([*rows, own])
 
     def trial_lines(self, objectives: Sequence[str], ranked: Sequence[Plain]) -> Iterator[str]:
-        yield "## Best trials in the search"
-        yield ""
         yield from _summary(ranked[:SHOWN])
         yield ""
         yield from _profiles(ranked[:PROFILES_SHOWN])

@@ -1,16 +1,15 @@
-"""What a sweep found, as Markdown and CSV, with figures: first of all how much of it survives."""
+"""What a sweep found, as a page, Markdown and CSV: first of all how much of it survives."""
 
 from __future__ import annotations
 
 import shutil
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import pandas as pd
 from optuna.importance import get_param_importances
 
-from analysis.figures.drawn import DRAWING
 from analysis.files import replaced_folder
 from analysis.report import export_results
 from analysis.results import check_results, write_provenance
@@ -18,12 +17,15 @@ from analysis.schema import PROVENANCE, leaves
 from analysis.tables.writers import to_csv
 from orchestrator.spec.structure import Plain
 from orchestrator.storage.rundir import RunDirectory
-from sweeps.confirm import confirm_spec
 from sweeps.questions import METRICS
+from sweeps.results.again import command
 from sweeps.results.figures import draw_figures
-from sweeps.search import search_spec
+from sweeps.results.page import render_page
+from sweeps.results.sections import HISTORY, Found, Section, sections
 from sweeps.spec import SweepSpec
 from sweeps.study import SweepStudy
+
+TRIALS = "trials.json"
 
 
 def results_names(sweep: SweepSpec) -> list[str]:
@@ -41,40 +43,62 @@ def write_report(
 ) -> None:
     """Write report/, and with `results` also what is kept with the code.
 
-    That is RESULTS/<table>/ of a grid, as of any run, and the report itself of any other sweep.
-    Raises RunError where larger results are there, unless `force` is set.
+    That is RESULTS/<table>/ of a grid, as of any run, and of any other sweep the report without its
+    page. Raises RunError where larger results are there, unless `force` is set.
     """
-    trials = directory.read_json("trials.json")
+    trials = directory.read_json(TRIALS)
     confirmed = directory.read_json("confirm.json") or {}
     importances = field_importances(study)
+    provenance = directory.read_json(PROVENANCE) or {}
     with replaced_folder(directory.path / "report") as folder:
         figures = draw_figures(sweep, trials, importances, folder / "figures")
         _write(folder / "trials.csv", to_csv(_flat(trials)))
         if confirmed:
             _write(folder / "confirm.csv", to_csv(_flat(confirmed["trials"])))
-        ranked = [trials[trial.number] for trial in study.ranked()]
-        lines = [
-            *head_lines(sweep, trials),
-            *confirm_lines(sweep, ranked[0], confirmed),
-            *sweep.question.trial_lines(sweep.objectives, ranked),
-            "",
-            *importance_lines(importances),
-            *cost_lines(directory.read_json("counts.json")),
-            *(f"![{name}](figures/{name}.png)" for name in figures),
-        ]
-        _write(folder / "index.md", "\n".join(lines).rstrip() + "\n")
+        shutil.copyfile(directory.path / TRIALS, folder / TRIALS)
+        found = Found(
+            sweep,
+            trials,
+            [trials[trial.number] for trial in study.ranked()],
+            confirmed,
+            importances,
+            directory.read_json("counts.json") or {},
+            provenance,
+            command(directory, directory.asked_sweep() or {}),
+            sorted(path.name for path in folder.iterdir() if path.is_file()),
+        )
+        told = sections(found, figures)
+        _write(folder / "index.md", markdown(sweep, told))
+        page = render_page(sweep, len(trials), told, folder / "figures")
+        _write(folder / "index.html", page)
     if results is not None and sweep.tables:
         for exported in export_results(directory.path / "table", results, force=force):
-            for name in figures:
-                for suffix in DRAWING:
-                    source = directory.path / "report" / "figures" / f"{name}.{suffix}"
-                    shutil.copyfile(source, exported / "figures" / f"sweep-{source.name}")
+            for figure in figures:
+                for file in figure.files:
+                    source = directory.path / "report" / "figures" / file
+                    shutil.copyfile(source, exported / "figures" / f"sweep-{file}")
     elif results is not None:
         check_results(results, results_names(sweep), sweep.extent, force)
         with replaced_folder(results / sweep.name) as draft:
-            shutil.copytree(directory.path / "report", draft, dirs_exist_ok=True)
-            provenance = directory.read_json(PROVENANCE) or {}
+            report, page_alone = directory.path / "report", shutil.ignore_patterns("index.html")
+            shutil.copytree(report, draft, dirs_exist_ok=True, ignore=page_alone)
             write_provenance(draft, results / sweep.name, provenance, sweep.extent)
+
+
+def markdown(sweep: SweepSpec, told: Sequence[Section]) -> str:
+    """The report as Markdown, which leaves out what is on the page only."""
+    lines = [f"# {sweep.title}", ""]
+    for section in told:
+        if not section.on_page_only:
+            lines += [f"## {section.title}", "", *section.lines, ""]
+            for figure in section.figures:
+                lines += [f"![{figure.caption}](figures/{figure.name}.png)", ""]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def summary(report: str) -> str:
+    """What comes before the figures in a report as Markdown, for a terminal."""
+    return report.partition(f"\n## {HISTORY}\n")[0].strip()
 
 
 def field_importances(study: SweepStudy) -> dict[str, float]:
@@ -87,66 +111,6 @@ def field_importances(study: SweepStudy) -> dict[str, float]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return get_param_importances(study.study, target=lambda trial: sign * trial.values[0])
-
-
-def head_lines(sweep: SweepSpec, trials: Sequence[Plain]) -> Iterator[str]:
-    """What was searched, and how."""
-    spec = search_spec(sweep)
-    given_up = sum(trial["pruned"] for trial in trials)
-    seeds = f"{spec.seeds} seed{'s' if spec.seeds > 1 else ''}"
-    yield f"# {sweep.title}"
-    yield ""
-    yield (
-        f"Sweep `{sweep.name}` at {sweep.scale} scale over `{Path(sweep.base).stem}`: "
-        f"{len(trials)} trials ({sweep.sampler}, {given_up} given up early), each on "
-        f"{len(spec.tasks)} tasks × {seeds} × {spec.episodes} episodes. "
-        f"{sweep.question.note} {sweep.question.seeds_note(spec.seeds)}"
-    )
-    yield ""
-
-
-def confirm_lines(sweep: SweepSpec, best: Plain, confirmed: Plain) -> Iterator[str]:
-    """The winner, and what is left of it where the search has never been."""
-    question = sweep.question
-    yield "## Winner"
-    yield ""
-    yield f"Trial {best['trial']}: {best['setting']}. In the search: {question.headline(best)}."
-    yield ""
-    if not confirmed:
-        yield (
-            f"It was not judged again: its {question.main} is that of the best of many, and so too "
-            "good. Set `confirm` to learn how much of it survives."
-        )
-        yield ""
-        return
-    spec, seeds = confirm_spec(sweep)
-    where = "held-out tasks" if confirmed["held_out"] else "tasks of the search"
-    numbers = ", ".join(map(str, seeds))
-    yield (
-        f"Judged again on {len(spec.tasks)} {where} by new seeds ({numbers}; root seed "
-        f"{spec.root_seed}), {spec.episodes} episodes each. {question.seeds_note(len(seeds))}"
-    )
-    yield ""
-    yield from question.confirmed_lines(confirmed)
-    yield ""
-
-
-def importance_lines(importances: dict[str, float]) -> Iterator[str]:
-    """How much each searched field matters; nothing where that is not known."""
-    if importances:
-        shares = ", ".join(f"`{path}` {share:.2f}" for path, share in importances.items())
-        yield f"Importances (PED-ANOVA): {shares}."
-        yield ""
-
-
-def cost_lines(counts: Plain) -> Iterator[str]:
-    """What was played for the sweep; all else was found in the store."""
-    yield "## What it took"
-    yield ""
-    for name, kinds in counts.items():
-        parts = ", ".join(f"{kind} {count:,}" for kind, count in kinds.items()) or "none"
-        yield f"- {name}: {parts}"
-    yield ""
 
 
 def _flat(rows: Sequence[Plain]) -> pd.DataFrame:

@@ -1,6 +1,7 @@
 """The commands a user types, and what is written for them."""
 
 import json
+import shlex
 import shutil
 import time
 from collections.abc import Iterator
@@ -21,11 +22,13 @@ from orchestrator.storage.rundir import RunDirectory
 from orchestrator.work.progress import Silent
 from sweeps import winner as winners
 from sweeps.candidates import method_of
-from sweeps.results.figures import draw_figures, paper_gains
+from sweeps.results.alpha_beta import paper_gains
+from sweeps.results.figures import draw_figures
 from sweeps.scoring import pareto_front
 from sweeps.search import run_search
 from sweeps.space import Dimension
 from sweeps.spec import Confirm, load_sweep
+from sweeps.study import SweepStudy
 from sweeps.sweep import carry_out
 from tests.orchestrator.launched import statuses
 from tests.orchestrator.tiny import TINY, Lines, Place
@@ -50,7 +53,7 @@ def test_what_a_user_sees(done: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert "## Winner" in out
     assert "Judged again on 2 held-out tasks by new seeds (1; root seed 0)" in out
     assert "Over the base's own setting it gains **" in out
-    assert f"report: {done / 'sweep' / 'report' / 'index.md'}" in out
+    assert f"report: {done / 'sweep' / 'report' / 'index.html'}" in out
     figures = {path.name for path in (done / "sweep" / "report" / "figures").glob("*.svg")}
     assert figures == {"history.svg", "importances.svg", "slices.svg", "alpha-beta.svg"}
 
@@ -65,7 +68,7 @@ def test_a_report_is_written_again(done: Path, capsys: pytest.CaptureFixture[str
     (sweep / "trials.json").unlink()
     shutil.rmtree(results)
     main(["report", str(sweep), "--results", str(results)])
-    assert capsys.readouterr().out == f"wrote {sweep / 'report' / 'index.md'}\n"
+    assert capsys.readouterr().out == f"wrote {sweep / 'report' / 'index.html'}\n"
     assert {path.name: path.read_bytes() for path in (sweep / "report").glob("*.*")} == before
     (exported,) = results.iterdir()
     assert (exported / "index.md").read_bytes() == before["index.md"]
@@ -134,6 +137,30 @@ def test_a_sweep_knows_its_store_and_uses_it_beside_others(
     main(command(done))
     assert searched == ["once"]
     assert RunDirectory(done / "sweep").store_root == (done / "store").resolve()
+
+
+def test_a_path_may_have_characters_that_mean_something_in_addresses(
+    trained: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Search, status, list, report and export; and nothing is written elsewhere."""
+    root = tmp_path / "here" / "a #b?c=1&d %41"
+    shutil.copytree(trained / "store", root / "store")
+    with mock.patch("sweeps.results.report.draw_figures", return_value=[]):
+        main(command(root, "--trials", "3"))
+        main(["report", str(root / "sweep")])
+    capsys.readouterr()
+    main(["status", str(root / "sweep")])
+    assert "3 of 3 finished" in capsys.readouterr().out
+    main(["list", str(tmp_path / "here")])
+    assert "finished, 3 of 3 trials" in capsys.readouterr().out
+    assert len(SweepStudy(tiny_sweep(trials=3), root / "sweep").finished) == 3
+    (root / "sweep" / "finished").unlink()
+    main(["status", str(root / "sweep")])
+    *_, again = capsys.readouterr().out.splitlines()
+    words = shlex.split(again.partition("skillstitch ")[2])
+    assert words[words.index("--out") + 1] == str(root / "sweep")
+    assert {path.name for path in root.iterdir()} == {"sweep", "store", "results"}
+    assert [path.name for path in root.parent.iterdir()] == [root.name]
 
 
 def test_the_plan_alone_runs_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -238,7 +265,7 @@ def test_every_figure_can_be_drawn(tmp_path: Path) -> None:
     worse = trial | {"trial": 2, "pruned": True, "imagined": 30.0}
     sweep = tiny_sweep(sampler="grid", space=GRID, objectives=("gain", "imagined"))
     drawn = draw_figures(sweep, [trial, other, worse], {ALPHA: 0.7, BETA: 0.3}, tmp_path)
-    assert drawn == [
+    assert [figure.name for figure in drawn] == [
         "history", "importances", "slices", "pareto", "alpha-beta", "alpha-beta-tasks",
     ]  # fmt: skip
     assert [one["trial"] for one in pareto_front([trial, other, worse])] == [0, 1]

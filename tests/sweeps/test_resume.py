@@ -17,8 +17,9 @@ from optuna.storages.journal import JournalFileBackend
 from orchestrator.errors import ChangedError, LockedError, StorageError
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.work import evaluation
+from sweeps.journal import JOURNAL, repair
 from sweeps.spec import Pruner
-from sweeps.study import JOURNAL, SweepStudy, repair
+from sweeps.study import SweepStudy
 from tests.orchestrator.tiny import Lines
 from tests.sweeps.tiny import TINY_SWEEP, promised, sweep_in, tiny_sweep
 
@@ -58,7 +59,7 @@ def test_again_plays_nothing(done: Path, expected: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("pruned", [False, True])
-def test_killed_at_every_fourth_write_to_the_journal(
+def test_killed_at_every_seventh_write_to_the_journal(
     trained: Path, expected: dict[str, Any], monkeypatch: pytest.MonkeyPatch, pruned: bool
 ) -> None:
     sweep = tiny_sweep(pruner=PRUNER) if pruned else SWEEP
@@ -72,7 +73,7 @@ def test_killed_at_every_fourth_write_to_the_journal(
     def append_and_die(self: Any, logs: Any) -> None:
         append(self, logs)
         written[0] += 1
-        if written[0] % (20 if pruned else 4) == 0:
+        if written[0] % (20 if pruned else 7) == 0:
             raise Killed
 
     monkeypatch.setattr(JournalFileBackend, "append_logs", append_and_die)

@@ -16,7 +16,7 @@ from sweeps.candidates import group, method_of
 from sweeps.search import rounds, search_spec
 from sweeps.space import Dimension, Fields
 from sweeps.spec import Confirm, Pruner, base_spec
-from sweeps.study import RESULT, SweepStudy
+from sweeps.study import SweepStudy, result_of
 from sweeps.winner import with_winner
 from tests.orchestrator.tiny import Counted, Place
 from tests.sweeps.tiny import sweep_in, tiny_sweep
@@ -165,7 +165,7 @@ def test_a_given_up_trial_is_told_as_what_it_would_be_on_all_tasks(trained: Path
     sweep = tiny_sweep(pruner=Pruner(rounds=4, p=0.45, startup=2), trials=12)
     sweep_in(trained, sweep)
     told = SweepStudy(sweep, trained / "sweep").trials
-    found = [trial.user_attrs[RESULT] for trial in told]
+    found = [result_of(trial) for trial in told]
     given_up = [number for number, result in enumerate(found) if result["pruned"]]
     for number in given_up:
         before = found[: number - number % sweep.batch]  # what was known when its batch was judged

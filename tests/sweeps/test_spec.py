@@ -1,5 +1,6 @@
 """What can be asked for, and how what cannot is refused."""
 
+import re
 from pathlib import Path
 from typing import Any, get_args
 
@@ -13,6 +14,7 @@ from orchestrator.spec.spec import TableSpec, load_spec
 from orchestrator.spec.tomls import Scale
 from orchestrator.storage.claim import describe
 from stitching.methods.mb_stitch import MBStitchSettings
+from sweeps.costs import plan_lines
 from sweeps.results.table import table_spec
 from sweeps.space import Dimension, replaced
 from sweeps.spec import (
@@ -26,6 +28,7 @@ from sweeps.spec import (
 from tests.sections import section
 from tests.sweeps.tiny import tiny_sweep
 
+ROOT = Path(__file__).parents[2]
 ALPHA = "mb_stitch.alpha"
 OWN = {ALPHA: 1.0, "mb_stitch.beta": 1.0, "mb_stitch.random_shooting.population": 4}
 """A setting within the tiny sweep's space."""
@@ -176,3 +179,28 @@ def test_a_table_compares_methods_and_not_models() -> None:
     table = TableSpec("mine", paper="", rows="task")
     with pytest.raises(UsageError, match="a table compares methods, not models"):
         tiny_sweep(sampler="grid", space=space, tables=(table,))
+
+
+@pytest.mark.parametrize("scale", get_args(Scale))
+def test_the_example_of_the_documentation_can_be_planned(scale: Scale, tmp_path: Path) -> None:
+    """As it is written, at every scale of its base."""
+    text = (ROOT / "docs" / "sweeps.md").read_text()
+    example, _ = re.findall(r"```toml\n(.*?)```", text, flags=re.DOTALL)
+    (tmp_path / "burners.toml").write_text(example)
+    sweep = load_sweep(str(tmp_path / "burners.toml"), scale)
+    head, *others = plan_lines(sweep, tmp_path / "store")
+    assert head.startswith(f"burners at {scale} scale: {4 if scale == 'smoke' else 40} trials")
+    assert len(others) == 2
+    assert base_spec(sweep).scale == scale
+
+
+def test_a_sweep_has_the_scales_of_its_base(tmp_path: Path) -> None:
+    own = '[space]\n"mb_stitch.alpha" = { choices = [1, 2] }\n'
+    path = tmp_path / "own.toml"
+    path.write_text(f'name = "own"\ntitle = "Own"\nbase = "table1"\nsampler = "grid"\n{own}')
+    quick = base_spec(load_sweep(str(path), "quick"))
+    assert quick.agent.updates == load_spec("table1", "quick").agent.updates
+    (tmp_path / "base.toml").write_text('benchmark = "maze"\nname = "a"\ntitle = "A"\n')
+    path.write_text(path.read_text().replace("table1", "base.toml"))
+    with pytest.raises(UsageError, match=r"base\.toml: no scale 'quick'; it has paper"):
+        load_sweep(str(path), "quick")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from orchestrator.errors import IncompleteError, StorageError
 from orchestrator.storage.ledger import Ledger
-from sweeps.study import JOURNAL, repair
+from sweeps.journal import JOURNAL, repair
 from tests.campaign.ground import Fault, Ground
 from tests.orchestrator.launched import in_a_process, run_serially
 from tests.orchestrator.tiny import Place, blocks_played

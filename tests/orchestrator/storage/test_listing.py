@@ -10,7 +10,12 @@ import pytest
 from orchestrator.cli import main
 from orchestrator.errors import UsageError
 from orchestrator.storage.listing import listing_lines
+from orchestrator.storage.rundir import RunDirectory
 from tests.orchestrator.tiny import Place
+
+
+def told(directory: RunDirectory) -> str:
+    return f"{directory.path.name} as its sweep says"
 
 
 def test_every_run_has_a_line(finished: Place, tmp_path: Path) -> None:
@@ -23,7 +28,8 @@ def test_every_run_has_a_line(finished: Place, tmp_path: Path) -> None:
     (runs / "damaged" / "spec.json").write_text("{")
     shutil.copytree(finished.out, runs / "store" / "agent" / "key")
     (runs / "store" / "blocks.sqlite").touch()
-    damaged, stopped, whole = listing_lines(runs)
+    shutil.copytree(finished.out, runs / "mlartifacts" / "0123" / "artifacts")
+    damaged, stopped, whole = listing_lines(runs, told)
     assert "unreadable" in damaged
     assert stopped.startswith(str(runs / "deep" / "stopped"))
     assert "tiny at paper scale" in stopped
@@ -32,20 +38,19 @@ def test_every_run_has_a_line(finished: Place, tmp_path: Path) -> None:
     assert whole.endswith("UTC")
 
 
-def test_a_sweep_is_told_by_its_trials(finished: Place, tmp_path: Path) -> None:
+def test_a_sweep_tells_itself_how_far_it_is(finished: Place, tmp_path: Path) -> None:
     shutil.copytree(finished.out, tmp_path / "sweep")
-    asked = {"name": "search", "scale": "quick", "trials": 5}
+    asked = {"name": "search", "scale": "quick"}
     (tmp_path / "sweep" / "sweep.json").write_text(json.dumps(asked))
-    (tmp_path / "sweep" / "trials.json").write_text(json.dumps([{}, {}]))
-    (line,) = listing_lines(tmp_path)
+    (line,) = listing_lines(tmp_path, told)
     assert "search at quick scale" in line
-    assert "2 of 5 trials" in line
+    assert "sweep as its sweep says" in line
 
 
 def test_a_folder_without_a_run(tmp_path: Path) -> None:
-    assert list(listing_lines(tmp_path)) == [f"no run in {tmp_path}"]
+    assert list(listing_lines(tmp_path, told)) == [f"no run in {tmp_path}"]
     with pytest.raises(UsageError, match="is no folder"):
-        list(listing_lines(tmp_path / "nowhere"))
+        list(listing_lines(tmp_path / "nowhere", told))
 
 
 def test_what_a_user_sees(finished: Place, capsys: pytest.CaptureFixture[str]) -> None:

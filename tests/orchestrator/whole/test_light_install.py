@@ -10,7 +10,11 @@ from packaging.requirements import Requirement
 from tests.orchestrator.tiny import TINY, Place
 
 ROOT = Path(__file__).parents[3]
-MODULES = {"imageio-ffmpeg": "imageio_ffmpeg", "gymnasium-robotics": "gymnasium_robotics"}
+MODULES = {
+    "imageio-ffmpeg": "imageio_ffmpeg",
+    "gymnasium-robotics": "gymnasium_robotics",
+    "markdown-it-py": "markdown_it",
+}
 
 
 def extra() -> set[str]:
