@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from analysis.files import can_write
 from analysis.schema import PROVENANCE, RunError
 
 SCALES = ("smoke", "quick", "standard", "paper")  # from the smallest
@@ -23,7 +23,7 @@ def check_results(results: Path, names: Iterable[str], extent: Extent, force: bo
     anything is replaced; so is what tells no extent.
     """
     existing = _existing(results)
-    if not existing.is_dir() or not os.access(existing, os.W_OK | os.X_OK):
+    if not can_write(existing):
         raise RunError(f"{results}: {existing} is no folder that can be written to; name another")
     for name in names:
         kept = extent_of(results / name)

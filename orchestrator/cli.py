@@ -5,6 +5,7 @@ Each command imports what it needs: torch and the simulators take seconds, and h
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -22,6 +23,7 @@ from orchestrator.spec.tomls import packaged_specs
 from stitching.registry import PartError
 
 INTERRUPTED, UNREAD, TERMINATED = 130, 141, 143  # as shells count SIGINT, SIGPIPE and SIGTERM
+OUT_OF_REACH = (errno.EACCES, errno.EPERM, errno.ELOOP, errno.ENAMETOOLONG)  # of paths given
 RUN_PACKAGES = ("torch", "mujoco", "ray", "optuna", "mlflow", "gymnasium_robotics", "robosuite")
 ERRORS = Console(stderr=True, highlight=False, soft_wrap=True)
 OUTPUT = Console(highlight=False, soft_wrap=True)
@@ -48,12 +50,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
             markup=False,
         )
         sys.exit(UsageError.exit_code)
-    except KeyboardInterrupt:
-        ERRORS.print("interrupted; the same command resumes", markup=False)
-        sys.exit(TERMINATED if sigterm.received else INTERRUPTED)
     except BrokenPipeError:  # nobody reads on, as after `| head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(UNREAD)
+    except OSError as error:
+        if error.filename is None or error.errno not in OUT_OF_REACH:
+            raise
+        ERRORS.print(f"error: {error.filename}: {error.strerror}; name another", markup=False)
+        sys.exit(UsageError.exit_code)
+    except KeyboardInterrupt:
+        ERRORS.print("interrupted; the same command resumes", markup=False)
+        sys.exit(TERMINATED if sigterm.received else INTERRUPTED)
 
 
 def _dispatch(words: list[str]) -> None:

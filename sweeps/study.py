@@ -26,7 +26,7 @@ from optuna.study import StudyDirection
 from optuna.trial import FrozenTrial, TrialState, create_trial
 
 from orchestrator.errors import ChangedError, StorageError
-from orchestrator.storage.store import storage_errors
+from orchestrator.storage.store import make_folder, storage_errors
 from stitching.streams import stream
 from sweeps.questions import METRICS
 from sweeps.space import Fields, current, describe
@@ -43,8 +43,8 @@ def repair(path: Path) -> int:
     Optuna appends behind it otherwise, and nothing can be read any more. Raises StorageError for
     damage elsewhere, and for a file that cannot be written.
     """
+    make_folder(path.parent)
     with storage_errors(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("ab"):  # refused here, before anything is played for nothing
             pass
         data = path.read_bytes()
