@@ -53,6 +53,18 @@ def can_write(folder: Path) -> bool:
         return False
 
 
+def existing_above(path: Path) -> Path:
+    """The path itself, or the nearest folder above it that is there.
+
+    Raises OSError where it cannot be looked at: a name that is too long, a folder closed to us.
+    """
+    try:
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return existing_above(path.absolute().parent)
+    return path
+
+
 def sync(path: Path) -> None:
     """Flush a file, or a folder's names, to the device, where the file system can do that."""
     descriptor = os.open(path, os.O_RDONLY)

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from analysis.files import can_write
+from analysis.files import can_write, existing_above
 from analysis.schema import PROVENANCE, RunError
 
 SCALES = ("smoke", "quick", "standard", "paper")  # from the smallest
@@ -22,7 +22,11 @@ def check_results(results: Path, names: Iterable[str], extent: Extent, force: bo
     run, so that it does not end in vain, and again when its tables are written. With `force`
     anything is replaced; so is what tells no extent.
     """
-    existing = _existing(results)
+    try:
+        existing = existing_above(results)
+    except OSError as error:
+        reason = f"cannot be looked at ({error.strerror}); name another"
+        raise RunError(f"{results}: {reason}") from error
     if not can_write(existing):
         raise RunError(f"{results}: {existing} is no folder that can be written to; name another")
     for name in names:
@@ -33,17 +37,6 @@ def check_results(results: Path, names: Iterable[str], extent: Extent, force: bo
                     f"{results / name} holds more, {what} {kept[what]} against {extent[what]}: "
                     "export to another folder, or say --force to replace it"
                 )
-
-
-def _existing(path: Path) -> Path:
-    """The path itself, or the nearest folder above it that is there."""
-    try:
-        path.lstat()
-    except (FileNotFoundError, NotADirectoryError):
-        return _existing(path.absolute().parent)
-    except OSError as error:
-        raise RunError(f"{path}: cannot be looked at ({error.strerror}); name another") from error
-    return path
 
 
 def _size(value: str | int) -> int:

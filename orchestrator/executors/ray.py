@@ -9,6 +9,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Any
 
+from orchestrator import libraries
 from orchestrator.cores import usable_cores
 from orchestrator.errors import UsageError
 from orchestrator.interruption import own_handler_kept
@@ -31,6 +32,7 @@ from ray.exceptions import RayError  # noqa: E402
 
 @ray.remote(num_cpus=1, max_retries=0)
 def _build(job: BuildJob, roles: list[str], *artifacts: Artifact) -> Report:
+    libraries.give_places()
     from orchestrator.work.worker import build, use_one_thread
 
     use_one_thread()
@@ -42,6 +44,7 @@ class _Player:
     """A block player with the artifacts it has been shown so far."""
 
     def __init__(self) -> None:
+        libraries.give_places()
         from orchestrator.work.playing import BlockPlayer
         from orchestrator.work.worker import use_one_thread
 
@@ -194,9 +197,10 @@ def _start(workers: int | None, address: str | None) -> None:
             _can_connect(address)
         except OSError as error:
             raise UsageError(f"no Ray cluster at {address}: {_first_line(error)}") from error
+        there = {"env_vars": environment | {"MUJOCO_GL": "disable"}}  # no worker draws
         try:
             with own_handler_kept():
-                ray.init(address=address, runtime_env={"env_vars": environment}, **common)
+                ray.init(address=address, runtime_env=there, **common)
         except (OSError, ValueError, RuntimeError) as error:
             raise UsageError(
                 f"something answers at {address}, but no Ray cluster lets this process in "
@@ -207,12 +211,14 @@ def _start(workers: int | None, address: str | None) -> None:
             ) from error
         return
     os.environ.update(environment)
+    libraries.give_ray_a_token()
     with own_handler_kept():
         ray.init(
             address="local",
             num_cpus=workers or usable_cores(),
             include_dashboard=False,
             object_store_memory=OBJECT_STORE_BYTES,
+            _temp_dir=libraries.ray_folder(),
             **common,
         )
 
