@@ -9,6 +9,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
+from io import TextIOWrapper
 from pathlib import Path
 
 import tyro
@@ -29,6 +30,7 @@ OUTPUT = Console(highlight=False, soft_wrap=True)
 def main(arguments: Sequence[str] | None = None) -> None:
     """Entry point; exits with 0, or the code of the error (see `orchestrator.errors`)."""
     words = list(sys.argv[1:] if arguments is None else arguments)
+    _print_in_any_encoding()
     set_drawing_aside()
     give_places()
     try:
@@ -47,6 +49,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
         line, code = told
         ERRORS.print(f"error: {line}", markup=False)
         sys.exit(code)
+
+
+def _print_in_any_encoding() -> None:
+    """What a terminal or a log cannot show, as α or a path of odd bytes, is written as its code."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _dispatch(words: list[str]) -> None:

@@ -124,7 +124,8 @@ def suite_plan_lines(suite: Suite, store_root: Path, workers: int | None) -> Ite
 def summary_lines(directory: RunDirectory) -> Iterator[str]:
     """A finished run: its tables, where its time went, where to look."""
     for table in directory.asked()["tables"]:
-        yield (directory.path / "report" / f"{table['id']}.md").read_text().strip()
+        file = directory.path / "report" / f"{table['id']}.md"
+        yield file.read_text(encoding="utf-8").strip()
         yield ""
     seconds = directory.read_json("seconds.json") or {}
     phases = sorted(seconds.items(), key=lambda phase: -phase[1])

@@ -77,6 +77,7 @@ def sweep(words: list[str], output: Console, errors: Console) -> None:
 
 def summary_lines(directory: RunDirectory) -> Iterator[str]:
     """The report of a sweep, and where it is."""
-    yield (directory.path / "report" / "index.md").read_text().strip()
+    report = directory.path / "report" / "index.md"
+    yield report.read_text(encoding="utf-8").strip()
     yield ""
-    yield f"report: {directory.path / 'report' / 'index.md'}"
+    yield f"report: {report}"

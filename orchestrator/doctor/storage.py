@@ -48,7 +48,7 @@ def judge_disk(free: int) -> Finding:
 
 def check_locks(folder: Path) -> Finding:
     """A lock that is held must keep a second one out, or two launches would share a run."""
-    with (folder / "lock").open("w") as first, (folder / "lock").open("w") as second:
+    with (folder / "lock").open("wb") as first, (folder / "lock").open("wb") as second:
         try:
             fcntl.flock(first, fcntl.LOCK_EX | fcntl.LOCK_NB)
             fcntl.flock(second, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -70,7 +70,7 @@ def turn_to_write(uri: str) -> Iterator[None]:
             "name another with --tracking-uri sqlite:///FILE"
         )
     database.parent.mkdir(parents=True, exist_ok=True)
-    with database.with_name(f"{database.name}.lock").open("w") as file:
+    with database.with_name(f"{database.name}.lock").open("wb") as file:
         deadline = time.monotonic() + TURN_SECONDS
         while not _try_lock(file.fileno()):
             if time.monotonic() > deadline:

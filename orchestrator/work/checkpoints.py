@@ -98,7 +98,9 @@ class CheckpointFile:
         news = {"done": done, "updates": updates, "losses": losses}
         with suppress(OSError):
             self.path.parent.mkdir(exist_ok=True)
-            self.path.with_name(f"{self.path.name}{NEWS}").write_text(json.dumps(news))
+            self.path.with_name(f"{self.path.name}{NEWS}").write_text(
+                json.dumps(news), encoding="utf-8"
+            )
 
     def read(self) -> tuple[dict[str, torch.Tensor], dict[str, Any]] | None:
         try:
@@ -136,7 +138,7 @@ def news_of(folder: Path, since: float = 0.0) -> News | None:
         for file in sorted(folder.glob(f"*{NEWS}")):
             with suppress(OSError, ValueError):  # it is being written, or is gone
                 if (when := file.stat().st_mtime) >= since:
-                    told.append((when, json.loads(file.read_text())))
+                    told.append((when, json.loads(file.read_text(encoding="utf-8"))))
     if not told:
         return None
     _, newest = max(told, key=lambda news: news[0])

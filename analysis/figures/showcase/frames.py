@@ -23,7 +23,7 @@ def render_frames(scene: Mapping[str, Any], positions: np.ndarray) -> np.ndarray
     with TemporaryDirectory() as folder:
         names = ("scene.json", "positions.npy", "frames.npy")
         described, recorded, drawn = (Path(folder) / name for name in names)
-        described.write_text(json.dumps(scene))
+        described.write_text(json.dumps(scene), encoding="utf-8")
         np.save(recorded, positions)
         complaints = []
         for backend in backends():
