@@ -10,7 +10,7 @@ from orchestrator.errors import ChangedError, UsageError
 from orchestrator.reproduction import LazyExecutor, Settings
 from orchestrator.spec.structure import Plain, structure, to_plain
 from orchestrator.storage import locking
-from orchestrator.storage.claim import claim_for_spec, spec_of
+from orchestrator.storage.claim import claim_for_spec, is_unused, spec_of
 from orchestrator.storage.provenance import provenance
 from orchestrator.storage.rundir import SWEEP, RunDirectory
 from orchestrator.storage.store import storage_errors
@@ -23,7 +23,7 @@ from sweeps.results.tracking import Tracker
 from sweeps.search import run_search, search_spec
 from sweeps.space import describe
 from sweeps.spec import SweepSpec
-from sweeps.study import RESULT, SweepStudy, feasible
+from sweeps.study import JOURNAL, RESULT, SweepStudy, feasible
 
 MAY_CHANGE = ("trials", "enqueued", "confirm", "title", "tables")  # under a study that goes on
 
@@ -116,7 +116,9 @@ def settle(directory: RunDirectory, sweep: SweepSpec) -> None:
         for name, value in asked.items()
         if name not in MAY_CHANGE and before.get(name) != value
     ]
-    if changed:
+    if changed and is_unused(directory):
+        (directory.path / JOURNAL).unlink(missing_ok=True)
+    elif changed:
         raise ChangedError(
             f"{directory.path} holds another study; choose another --out (finished blocks are "
             "shared), or go back to:\n  " + "\n  ".join(changed)

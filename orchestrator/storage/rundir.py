@@ -18,6 +18,8 @@ from orchestrator.storage.store import USUAL_STORE, write_atomically
 
 FINISHED = "finished"
 PLANNED = "plan.json"
+LEDGER = "ledger.sqlite"
+TRACKING = "tracking.json"
 SWEEP = "sweep.json"
 REPORT_SOURCES = (".py", ".csv", ".html", ".css", ".js")
 
@@ -44,7 +46,7 @@ class RunDirectory:
         self.path = path
 
     def ledger(self, *, read_only: bool = False) -> Ledger:
-        path = self.path / "ledger.sqlite"
+        path = self.path / LEDGER
         if read_only and not path.is_file():
             raise UsageError(f"{self.path} has no ledger yet: nothing was played there")
         return Ledger(path, read_only=read_only)
