@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import os
-import socket
 from collections import deque
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,6 +11,7 @@ from typing import Any
 from orchestrator import libraries
 from orchestrator.cores import usable_cores
 from orchestrator.errors import UsageError
+from orchestrator.executors.address import check_answer
 from orchestrator.interruption import own_handler_kept
 from orchestrator.storage.store import Artifact
 from orchestrator.work.jobs import BuildJob, Job, PlayJob, Report
@@ -22,7 +22,6 @@ os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
 
 OBJECT_STORE_BYTES = 512 * 2**20
 JOBS_PER_WORKER = 2  # one running, one waiting, so that no worker idles between jobs
-SECONDS_TO_ANSWER = 5.0  # of a cluster's head node
 SECONDS_BETWEEN_CHECKS = 5.0  # for nodes that have gone, where no job finishes
 
 import ray  # noqa: E402
@@ -194,7 +193,7 @@ def _start(workers: int | None, address: str | None) -> None:
     if address is not None:
         address = _started_here() if address == "auto" else address
         try:
-            _can_connect(address)
+            check_answer(address)
         except OSError as error:
             raise UsageError(f"no Ray cluster at {address}: {_first_line(error)}") from error
         there = {"env_vars": environment | {"MUJOCO_GL": "disable"}}  # no worker draws
@@ -232,13 +231,6 @@ def _started_here() -> str:
             "RAY_ADDRESS is not set; name the head, as in --address HEAD:6379"
         )
     return found
-
-
-def _can_connect(address: str) -> None:
-    """Find out in seconds that nobody is there; Ray itself tries for minutes."""
-    host, _, port = address.rpartition(":")
-    if host and port.isdigit():
-        socket.create_connection((host, int(port)), SECONDS_TO_ANSWER).close()
 
 
 def _first_line(error: Exception) -> str:
