@@ -93,7 +93,9 @@ def _workers_kept(settings: Settings, nothing_to_do: bool) -> Iterator[None]:
     if settings.executor == "serial" or nothing_to_do:
         yield
         return
-    executor = open_executor(settings.executor, settings.workers, settings.address)
+    executor = open_executor(
+        settings.executor, settings.workers, settings.address, settings.dashboard
+    )
     try:
         yield
     finally:

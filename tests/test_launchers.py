@@ -26,9 +26,7 @@ def test_the_batch_file_asks_for_what_it_uses() -> None:
 def test_the_image_copies_what_is_there() -> None:
     text = IMAGE.read_text()
     copied = [
-        name
-        for line in re.findall(r"^COPY (.*) \S+$", text, re.MULTILINE)
-        for name in line.split()
+        name for line in re.findall(r"^COPY (.*) \S+$", text, re.MULTILINE) for name in line.split()
     ]
     assert {"stitching", "orchestrator", "sweeps", "analysis", "pyproject.toml"} <= set(copied)
     for name in copied:

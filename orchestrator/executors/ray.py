@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import logging
 import os
+import sys
 from collections import deque
 from dataclasses import dataclass, field
+from importlib import import_module
 from typing import Any
 
 from orchestrator import libraries
@@ -78,10 +80,12 @@ class _Flight:
 class RayExecutor:
     """Runs on this machine's cores, or on the cluster at `address`."""
 
-    def __init__(self, workers: int | None = None, address: str | None = None) -> None:
+    def __init__(
+        self, workers: int | None = None, address: str | None = None, dashboard: bool = False
+    ) -> None:
         self._owned = not ray.is_initialized()
         if self._owned:
-            _start(workers, address)
+            _start(workers, address, dashboard)
         self._most_workers = workers
         self.workers = self._capacity()
         self._references: dict[str, Any] = {}
@@ -186,7 +190,7 @@ class RayExecutor:
             self._dismiss(slot)
 
 
-def _start(workers: int | None, address: str | None) -> None:
+def _start(workers: int | None, address: str | None, dashboard: bool) -> None:
     common: dict[str, Any] = {"log_to_driver": False, "logging_level": logging.ERROR}
     # A worker is one thread; more would change the bytes.
     environment = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
@@ -211,15 +215,30 @@ def _start(workers: int | None, address: str | None) -> None:
         return
     os.environ.update(environment)
     libraries.give_ray_a_token()
+    if dashboard:
+        _check_dashboard()
     with own_handler_kept():
-        ray.init(
+        started = ray.init(
             address="local",
             num_cpus=workers or usable_cores(),
-            include_dashboard=False,
+            include_dashboard=dashboard,  # on loopback
             object_store_memory=OBJECT_STORE_BYTES,
             _temp_dir=libraries.ray_folder(),
             **common,
         )
+    if dashboard:
+        print(f"Ray's dashboard: http://{started.dashboard_url}", file=sys.stderr)
+
+
+def _check_dashboard() -> None:
+    """Without its packages Ray starts one that answers and shows nothing."""
+    try:
+        import_module("ray.dashboard.optional_deps")
+    except ImportError as error:
+        raise UsageError(
+            f"--dashboard: {error.name} is not installed; run "
+            f"`pip install 'ray[default]=={ray.__version__}'`"
+        ) from error
 
 
 def _started_here() -> str:
