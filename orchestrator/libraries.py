@@ -56,7 +56,10 @@ def matplotlib_can_write() -> bool:
 
 def numba_can_write() -> bool:
     """Code that it has compiled for robosuite, which cannot be imported elsewhere."""
-    robosuite = find_spec("robosuite")
+    try:
+        robosuite = find_spec("robosuite")
+    except ModuleNotFoundError:  # of who hides what is installed
+        return True
     if robosuite is None or robosuite.origin is None:
         return True
     installed = Path(robosuite.origin).parent / "utils" / "__pycache__"
