@@ -1,11 +1,13 @@
 """Files and folders that are there whole or not at all, whenever the process is killed."""
 
 import ctypes
+import errno
 import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryFile
 
 AT_FDCWD, RENAME_EXCHANGE = -100, 2  # of renameat2(2)
 
@@ -16,9 +18,9 @@ def replaced_file(target: Path) -> Iterator[Path]:
     draft = _draft(target)
     try:
         yield draft
-        _sync(draft)
+        sync(draft)
         draft.replace(target)
-        _sync(target.parent)
+        sync(target.parent)
     finally:
         draft.unlink(missing_ok=True)
 
@@ -35,11 +37,44 @@ def replaced_folder(target: Path) -> Iterator[Path]:
     try:
         yield draft
         for path in (*draft.rglob("*"), draft):
-            _sync(path)
+            sync(path)
         _put_in_place(draft, target)
-        _sync(target.parent)
+        sync(target.parent)
     finally:
         shutil.rmtree(draft, ignore_errors=True)
+
+
+def can_write(folder: Path) -> bool:
+    """Whether a file can be made in a folder, which is tried: permissions do not tell all."""
+    try:
+        with TemporaryFile(dir=folder):
+            return True
+    except OSError:
+        return False
+
+
+def existing_above(path: Path) -> Path:
+    """The path itself, or the nearest folder above it that is there.
+
+    Raises OSError where it cannot be looked at: a name that is too long, a folder closed to us.
+    """
+    try:
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return existing_above(path.absolute().parent)
+    return path
+
+
+def sync(path: Path) -> None:
+    """Flush a file, or a folder's names, to the device, where the file system can do that."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):
+            raise  # some network and user-space file systems cannot for folders; these say so
+    finally:
+        os.close(descriptor)
 
 
 def _draft(target: Path) -> Path:
@@ -60,14 +95,6 @@ def _alive(process: int) -> bool:
     except PermissionError:  # somebody else's
         return True
     return process != os.getpid()
-
-
-def _sync(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def _put_in_place(draft: Path, target: Path) -> None:

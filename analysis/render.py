@@ -60,4 +60,4 @@ def load_model(scene: Mapping[str, Any]) -> mujoco.MjModel:
 
 if __name__ == "__main__":
     described, recorded, target = map(Path, sys.argv[1:])
-    np.save(target, render(json.loads(described.read_text()), np.load(recorded)))
+    np.save(target, render(json.loads(described.read_text(encoding="utf-8")), np.load(recorded)))

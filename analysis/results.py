@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from analysis.files import can_write, existing_above
 from analysis.schema import PROVENANCE, RunError
 
 SCALES = ("smoke", "quick", "standard", "paper")  # from the smallest
@@ -24,8 +24,12 @@ def check_results(results: Path, names: Iterable[str], extent: Extent, force: bo
     run, so that it does not end in vain, and again when its tables are written. With `force`
     anything is replaced; so is what tells no extent.
     """
-    existing = _existing(results)
-    if not existing.is_dir() or not os.access(existing, os.W_OK | os.X_OK):
+    try:
+        existing = existing_above(results)
+    except OSError as error:
+        reason = f"cannot be looked at ({error.strerror}); name another"
+        raise RunError(f"{results}: {reason}") from error
+    if not can_write(existing):
         raise RunError(f"{results}: {existing} is no folder that can be written to; name another")
     for name in names:
         kept = extent_of(results / name)
@@ -35,17 +39,6 @@ def check_results(results: Path, names: Iterable[str], extent: Extent, force: bo
                     f"{results / name} holds more, {what} {kept[what]} against {extent[what]}: "
                     "export to another folder, or say --force to replace it"
                 )
-
-
-def _existing(path: Path) -> Path:
-    """The path itself, or the nearest folder above it that is there."""
-    try:
-        path.lstat()
-    except (FileNotFoundError, NotADirectoryError):
-        return _existing(path.absolute().parent)
-    except OSError as error:
-        raise RunError(f"{path}: cannot be looked at ({error.strerror}); name another") from error
-    return path
 
 
 def _size(value: str | int) -> int:

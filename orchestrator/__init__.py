@@ -70,12 +70,14 @@ def reproduce(
     """
     from pathlib import Path
 
+    from orchestrator.libraries import give_places
     from orchestrator.reproduction import Settings
     from orchestrator.storage.rundir import default_out
     from orchestrator.storage.store import USUAL_STORE
     from orchestrator.suite_reproduction import reproduce_asked
     from orchestrator.work.progress import Silent
 
+    give_places()
     settings = Settings(
         Path(out) if out is not None else default_out(spec),
         Path(store) if store is not None else USUAL_STORE,

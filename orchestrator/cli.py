@@ -9,20 +9,20 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
+from io import TextIOWrapper
 from pathlib import Path
 
 import tyro
 from rich.console import Console
 
 from orchestrator import run_commands
-from orchestrator.errors import SkillstitchError, UsageError
+from orchestrator.errors import UsageError, explained
 from orchestrator.interruption import interrupted_by_sigterm
 from orchestrator.lazily import import_lazily
+from orchestrator.libraries import give_places, set_drawing_aside
 from orchestrator.spec.tomls import packaged_specs
-from stitching.registry import PartError
 
 INTERRUPTED, UNREAD, TERMINATED = 130, 141, 143  # as shells count SIGINT, SIGPIPE and SIGTERM
-RUN_PACKAGES = ("torch", "mujoco", "ray", "optuna", "mlflow", "gymnasium_robotics", "robosuite")
 ERRORS = Console(stderr=True, highlight=False, soft_wrap=True)
 OUTPUT = Console(highlight=False, soft_wrap=True)
 
@@ -30,30 +30,32 @@ OUTPUT = Console(highlight=False, soft_wrap=True)
 def main(arguments: Sequence[str] | None = None) -> None:
     """Entry point; exits with 0, or the code of the error (see `orchestrator.errors`)."""
     words = list(sys.argv[1:] if arguments is None else arguments)
+    _print_in_any_encoding()
+    set_drawing_aside()
+    give_places()
     try:
         with interrupted_by_sigterm() as sigterm:
             _dispatch(words)
-    except SkillstitchError as error:
-        ERRORS.print(f"error: {error}", markup=False)
-        sys.exit(error.exit_code)
-    except PartError as error:
-        ERRORS.print(f"error: {error}; mend or uninstall it", markup=False)
-        sys.exit(UsageError.exit_code)
-    except ModuleNotFoundError as error:
-        if error.name not in RUN_PACKAGES:
-            raise
-        ERRORS.print(
-            f"error: {error.name} is not installed, and this command trains, plays or plans: "
-            "install skillstitch with its extra `run`, as in `pip install -e '.[run]'`",
-            markup=False,
-        )
-        sys.exit(UsageError.exit_code)
     except KeyboardInterrupt:
         ERRORS.print("interrupted; the same command resumes", markup=False)
         sys.exit(TERMINATED if sigterm.received else INTERRUPTED)
     except BrokenPipeError:  # nobody reads on, as after `| head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(UNREAD)
+    except Exception as error:
+        told = explained(error)
+        if told is None:
+            raise
+        line, code = told
+        ERRORS.print(f"error: {line}", markup=False)
+        sys.exit(code)
+
+
+def _print_in_any_encoding() -> None:
+    """What a terminal or a log cannot show, as α or a path of odd bytes, is written as its code."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _dispatch(words: list[str]) -> None:

@@ -26,7 +26,7 @@ def cgroup_quota(root: Path, own: Path) -> float:
     Infinite without a limit, with control groups of version 1, and where there are none.
     """
     try:
-        lines = own.read_text().splitlines()
+        lines = own.read_text(encoding="utf-8").splitlines()
     except OSError:
         return math.inf
     groups = [root / line.removeprefix("0::/") for line in lines if line.startswith("0::/")]
@@ -37,7 +37,7 @@ def cgroup_quota(root: Path, own: Path) -> float:
 def _limit(group: Path) -> float:
     """From cpu.max, "QUOTA PERIOD" in microseconds, where QUOTA may be "max"."""
     try:
-        quota, period = (group / "cpu.max").read_text().split()
+        quota, period = (group / "cpu.max").read_text(encoding="utf-8").split()
     except OSError:  # the topmost group has none
         return math.inf
     return math.inf if quota == "max" else int(quota) / int(period)

@@ -20,7 +20,7 @@ from orchestrator.errors import UsageError
 from orchestrator.spec.structure import Plain
 from orchestrator.storage.claim import spec_of
 from orchestrator.storage.rundir import RunDirectory
-from orchestrator.storage.store import Artifact, Store, storage_errors
+from orchestrator.storage.store import Artifact, Store, make_folder, storage_errors
 from orchestrator.work.plan import Plan, make_plan
 from stitching.data.transitions import NO_SKILL, Transitions
 from stitching.envs.protocol import Benchmark
@@ -55,19 +55,18 @@ def export_run(directory: RunDirectory, out: Path, store_root: Path | None) -> I
         name: store.demand(plan.recipes[key].kind, key) for name, key in (models | datasets).items()
     }
     provenance = directory.read_json(PROVENANCE) or {}
-    with storage_errors(out.parent):
-        out.parent.mkdir(parents=True, exist_ok=True)
-        with replaced_folder(out) as draft:
-            for folder in ("models", "datasets"):
-                (draft / folder).mkdir()
-            for name, key in models.items():
-                card = _card(plan, key, content[name])
-                _write_model(draft / "models" / name, content[name], card)
-            with _minari_writes_to(draft / "datasets"):
-                for role in datasets:
-                    _write_dataset(plan, role, content[role])
-            text = _describe(plan, str(provenance.get("git_revision", "of an unknown revision")))
-            (draft / "README.md").write_text(text, encoding="utf-8")
+    make_folder(out.parent)
+    with storage_errors(out.parent), replaced_folder(out) as draft:
+        for folder in ("models", "datasets"):
+            (draft / folder).mkdir()
+        for name, key in models.items():
+            card = _card(plan, key, content[name])
+            _write_model(draft / "models" / name, content[name], card)
+        with _minari_writes_to(draft / "datasets"):
+            for role in datasets:
+                _write_dataset(plan, role, content[role])
+        text = _describe(plan, str(provenance.get("git_revision", "of an unknown revision")))
+        (draft / "README.md").write_text(text, encoding="utf-8")
     yield f"exported {len(models)} models and {len(datasets)} datasets to {out}"
 
 

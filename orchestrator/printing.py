@@ -140,8 +140,8 @@ def summary_lines(directory: RunDirectory) -> Iterator[str]:
     from analysis.page.sources import HEADING
 
     for table in directory.asked()["tables"]:
-        text = (directory.path / "report" / f"{table['id']}.md").read_text()
-        yield text.partition(HEADING)[0].strip()
+        file = directory.path / "report" / f"{table['id']}.md"
+        yield file.read_text(encoding="utf-8").partition(HEADING)[0].strip()
         yield ""
     seconds = directory.read_json("seconds.json") or {}
     phases = sorted(seconds.items(), key=lambda phase: -phase[1])

@@ -11,6 +11,7 @@ from pathlib import Path
 from analysis.report import build_report, export_results
 from orchestrator.errors import said_to_users
 from orchestrator.storage.rundir import RunDirectory
+from orchestrator.storage.store import storage_errors
 
 
 def report_again(run: Path, results: Path | None, *, force: bool) -> Iterator[str]:
@@ -28,7 +29,8 @@ def report_again(run: Path, results: Path | None, *, force: bool) -> Iterator[st
 
             merge_again(directory)
         if results is None:
-            build_report(run)
+            with storage_errors(run):
+                build_report(run)
         else:  # builds it, too
             yield from _export(run, results, force)
         if played:
@@ -43,4 +45,5 @@ def export(run: Path, results: Path, *, force: bool) -> Iterator[str]:
 
 
 def _export(run: Path, results: Path, force: bool) -> Iterator[str]:
-    yield from (f"exported {folder}" for folder in export_results(run, results, force=force))
+    with storage_errors(results):
+        yield from (f"exported {folder}" for folder in export_results(run, results, force=force))

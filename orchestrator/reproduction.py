@@ -16,6 +16,7 @@ from orchestrator.cores import check_workers
 from orchestrator.errors import (
     BadDataError,
     IncompleteError,
+    UsageError,
 )
 from orchestrator.executors import ExecutorKind, open_executor
 from orchestrator.executors.protocol import Executor
@@ -50,9 +51,15 @@ class Settings:
     workers: int | None = None  # all cores, or all of the cluster's
     address: str | None = None  # of a Ray cluster
     tracking_uri: str | None = None  # SQLite beside the store; "none" turns tracking off
+    dashboard: bool = False  # of a Ray of its own
 
     def __post_init__(self) -> None:
         check_workers(self.workers, self.address)
+        if self.dashboard and (self.executor != "ray" or self.address is not None):
+            raise UsageError(
+                "--dashboard is for a Ray that is started for this run; a cluster has its own: "
+                "`ray start --head --include-dashboard=true`"
+            )
 
     def resolved_tracking_uri(self) -> str:
         return self.tracking_uri or tracking.default_uri(self.store.parent)
@@ -68,7 +75,9 @@ class LazyExecutor:
     def open(self) -> Executor:
         if self.opened is None:
             settings = self.settings
-            self.opened = open_executor(settings.executor, settings.workers, settings.address)
+            self.opened = open_executor(
+                settings.executor, settings.workers, settings.address, settings.dashboard
+            )
         return self.opened
 
     @property

@@ -44,6 +44,7 @@ class RunCommand:
     executor: ExecutorKind = "ray"  # serial: everything in this process
     workers: int | None = None  # default: all cores, or all of the cluster's
     address: str | None = None  # of a Ray cluster to join, e.g. 10.0.0.1:6379 or auto
+    dashboard: bool = False  # show Ray's dashboard, on this machine alone
     tracking_uri: str | None = None  # MLflow; default: SQLite beside the store; none: off
     results: Path | None = None  # also export each table to RESULTS/<table>/
     force: bool = False  # let the exported tables replace larger ones
@@ -149,6 +150,7 @@ def run(words: list[str], output: Console, errors: Console) -> None:
         command.workers,
         command.address,
         command.tracking_uri,
+        command.dashboard,
     )
     if command.results is not None:
         from analysis.results import check_results

@@ -98,7 +98,9 @@ def _workers_kept(settings: Settings, nothing_to_do: bool, progress: Progress) -
         yield
         return
     with progress.step("starting workers"):
-        executor = open_executor(settings.executor, settings.workers, settings.address)
+        executor = open_executor(
+            settings.executor, settings.workers, settings.address, settings.dashboard
+        )
     try:
         yield
     finally:

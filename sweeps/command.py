@@ -35,6 +35,7 @@ class SweepCommand:
     executor: ExecutorKind = "ray"  # serial: everything in this process
     workers: int | None = None  # default: all cores, or all of the cluster's
     address: str | None = None  # of a Ray cluster to join
+    dashboard: bool = False  # show Ray's dashboard, on this machine alone
     tracking_uri: str | None = None  # MLflow; default: SQLite beside the store; none: off
     results: Path | None = None  # also export: RESULTS/<table>/ of a grid, else RESULTS/<name>/
     force: bool = False  # let the exported tables replace larger ones
@@ -59,6 +60,7 @@ def sweep(words: list[str], output: Console, errors: Console) -> None:
         command.workers,
         command.address,
         command.tracking_uri,
+        command.dashboard,
     )
     if command.plan:
         for line in plan_lines(asked, command.store):

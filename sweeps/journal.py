@@ -8,7 +8,7 @@ from pathlib import Path
 
 from orchestrator.errors import StorageError
 from orchestrator.spec.structure import Plain
-from orchestrator.storage.store import storage_errors
+from orchestrator.storage.store import make_folder, storage_errors
 
 JOURNAL = "study.journal"
 
@@ -19,8 +19,8 @@ def repair(path: Path) -> int:
     Optuna appends behind it otherwise, and nothing can be read any more. Raises StorageError for
     damage elsewhere, and for a file that cannot be written.
     """
+    make_folder(path.parent)
     with storage_errors(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("ab"):  # refused here, before anything is played for nothing
             pass
         data = path.read_bytes()

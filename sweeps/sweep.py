@@ -13,13 +13,14 @@ from orchestrator.errors import ChangedError, UsageError
 from orchestrator.reproduction import LazyExecutor, Settings
 from orchestrator.spec.structure import Plain, structure, to_plain
 from orchestrator.storage import locking
-from orchestrator.storage.claim import claim_for_spec, spec_of
+from orchestrator.storage.claim import claim_for_spec, is_unused, spec_of
 from orchestrator.storage.provenance import provenance
 from orchestrator.storage.rundir import PLANNED, SWEEP, RunDirectory
 from orchestrator.storage.store import storage_errors
 from orchestrator.work.plan import make_plan
 from orchestrator.work.progress import Progress
 from sweeps.confirm import confirm
+from sweeps.journal import JOURNAL
 from sweeps.player import CountingExecutor, SpecPlayer
 from sweeps.results.again import SOURCE
 from sweeps.results.report import write_report
@@ -128,7 +129,9 @@ def settle(directory: RunDirectory, sweep: SweepSpec) -> None:
         for name, value in asked.items()
         if name not in MAY_CHANGE and before.get(name) != value
     ]
-    if changed:
+    if changed and is_unused(directory):
+        (directory.path / JOURNAL).unlink(missing_ok=True)
+    elif changed:
         raise ChangedError(
             f"{directory.path} holds another study; choose another --out (finished blocks are "
             "shared), or go back to:\n  " + "\n  ".join(changed)

@@ -174,6 +174,45 @@ def test_the_method_plays_without_what_runs_it() -> None:
     assert not loaded & {"ray", "mlflow", "optuna", "orchestrator", "sweeps", "analysis", "pandas"}
 
 
+def opened_in_the_locale(source: str) -> Iterator[str]:
+    """Calls that read or write text in whatever encoding the machine is set to."""
+    for node in ast.walk(ast.parse(source)):
+        if not isinstance(node, ast.Call) or any(word.arg == "encoding" for word in node.keywords):
+            continue
+        method = node.func.attr if isinstance(node.func, ast.Attribute) else ""
+        function = node.func.id if isinstance(node.func, ast.Name) else ""
+        constants = [argument for argument in node.args if isinstance(argument, ast.Constant)]
+        strings = [each.value for each in constants if isinstance(each.value, str)]
+        if (
+            (method == "read_text" and not node.args)
+            or method == "write_text"
+            or (method == "open" and strings and "b" not in strings[0])
+            or (function == "open" and not any("b" in mode for mode in strings))
+        ):
+            yield f"line {node.lineno}: {ast.unparse(node)}"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "path.read_text()",
+        "path.write_text(text)",
+        "path.open('w')",
+        "open(path)",
+        "open(path, 'a')",
+    ],
+)
+def test_the_reader_of_encodings_finds(line: str) -> None:
+    assert list(opened_in_the_locale(line))
+    assert not list(opened_in_the_locale(f"{line[:-1]}, encoding='utf-8')".replace("(,", "(")))
+
+
+@pytest.mark.parametrize("file", SOURCES)
+def test_files_are_read_and_written_as_utf_8(file: str) -> None:
+    """Here and there the locale says otherwise."""
+    assert list(opened_in_the_locale(SOURCES[file])) == []
+
+
 @pytest.mark.parametrize("file", SOURCES)
 def test_files_stay_short_enough_to_read(file: str) -> None:
     lines = len(SOURCES[file].splitlines())

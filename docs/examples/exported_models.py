@@ -21,7 +21,7 @@ from stitching.models.dynamics import Dynamics, DynamicsConfig
 folder = Path(sys.argv[1])
 models = folder / "models"
 agent = Agent(load_file(models / "agent-seed-0.safetensors"), conditions(MAZE), MAZE.actions)
-config = json.loads((models / "dynamics-seed-0.json").read_text())["config"]
+config = json.loads((models / "dynamics-seed-0.json").read_text(encoding="utf-8"))["config"]
 weights = load_file(models / "dynamics-seed-0.safetensors")
 dynamics = Dynamics(weights, structure(DynamicsConfig, config, "dynamics"))
 

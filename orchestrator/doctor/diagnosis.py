@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from orchestrator.cores import usable_cores
-from orchestrator.doctor import machine, packages, selftest, storage
+from orchestrator.doctor import machine, packages, selftest, storage, surroundings
 from orchestrator.doctor.finding import Finding
 
 
@@ -21,6 +21,7 @@ def diagnose(root: Path) -> list[Finding]:
     checks: dict[str, Callable[[], Iterable[Finding]]] = {
         "Python": lambda: [packages.judge_python(platform.python_version())],
         "packages": packages.check_packages,
+        "places": surroundings.check_places,
         "cores": lambda: [machine.judge_cores(usable_cores(), os.environ.get("OMP_NUM_THREADS"))],
         "memory": lambda: [machine.judge_memory(machine.total_memory())],
         "shared memory": lambda: [machine.check_shared_memory()],
@@ -28,9 +29,15 @@ def diagnose(root: Path) -> list[Finding]:
         "disk": lambda: storage.check_root(root),
         "SQLite": lambda: [packages.judge_sqlite(sqlite3.sqlite_version_info)],
         "rendering": lambda: [machine.judge_rendering(machine.rendering_libraries())],
+        "MUJOCO_GL": surroundings.check_drawing,
         "self test": lambda: [selftest.check_training()],
     }
-    return [finding for name, check in checks.items() for finding in _guarded(name, check)]
+    imports = _guarded("imports", surroundings.check_imports)
+    if any(finding.name == "importing torch" for finding in imports):
+        del checks["GPU"], checks["self test"]  # it may end this process, too
+    return imports + [
+        finding for name, check in checks.items() for finding in _guarded(name, check)
+    ]
 
 
 def _guarded(name: str, check: Callable[[], Iterable[Finding]]) -> list[Finding]:

@@ -26,7 +26,7 @@ def total_memory() -> int:
     """What the machine has, or what its container is allowed."""
     machine = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     limit = Path("/sys/fs/cgroup/memory.max")
-    allowed = limit.read_text().strip() if limit.is_file() else "max"
+    allowed = limit.read_text(encoding="utf-8").strip() if limit.is_file() else "max"
     return machine if allowed == "max" else min(machine, int(allowed))
 
 

@@ -10,23 +10,27 @@ import tempfile
 from contextlib import closing
 from pathlib import Path
 
+from analysis.files import existing_above
 from orchestrator.doctor.finding import GIB, Finding, gib
 
 LEAST_DISK, ENOUGH_DISK = 1 * GIB, 10 * GIB
 
 
 def check_root(root: Path) -> list[Finding]:
-    """Room, and whether files, locks and databases work there: network disks may lack some."""
+    """Room, and whether files, locks and databases work there: network disks may lack some.
+
+    What is not there yet is not made: the nearest folder above it is looked at.
+    """
     try:
-        root.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".doctor-", dir=root) as folder:
+        there = existing_above(root)
+        with tempfile.TemporaryDirectory(prefix=".doctor-", dir=there) as folder:
             findings = [check_locks(Path(folder)), check_wal(Path(folder))]
     except OSError as error:
         advice = "choose another --out, or make this a directory that you may write to"
         return [Finding("writing", "fault", f"{root}: {error.strerror}", advice)]
     return [
         Finding("writing", "ok", str(root)),
-        judge_disk(shutil.disk_usage(root).free),
+        judge_disk(shutil.disk_usage(there).free),
         *findings,
     ]
 
@@ -44,7 +48,7 @@ def judge_disk(free: int) -> Finding:
 
 def check_locks(folder: Path) -> Finding:
     """A lock that is held must keep a second one out, or two launches would share a run."""
-    with (folder / "lock").open("w") as first, (folder / "lock").open("w") as second:
+    with (folder / "lock").open("wb") as first, (folder / "lock").open("wb") as second:
         try:
             fcntl.flock(first, fcntl.LOCK_EX | fcntl.LOCK_NB)
             fcntl.flock(second, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -13,7 +13,7 @@ from analysis.schema import SEPARATOR
 from orchestrator.episodes.replay import Asked, replay
 from orchestrator.errors import UsageError
 from orchestrator.storage.rundir import RunDirectory
-from orchestrator.storage.store import storage_errors
+from orchestrator.storage.store import make_folder, storage_errors
 
 
 def film(
@@ -37,8 +37,8 @@ def film(
     parts = [*asked.task, asked.method, f"seed-{asked.seed}", f"episode-{shown['episode']}"]
     name = "_".join(part.replace(" ", "-").replace("/", "-") for part in parts)
     path = out or directory.path / "episodes" / f"{name}.mp4"
+    make_folder(path.parent)
     with storage_errors(path.parent):
-        path.parent.mkdir(parents=True, exist_ok=True)
         try:
             write_film(shown, spec, path)
             write_picture(shown, spec, path.with_suffix(".png"))

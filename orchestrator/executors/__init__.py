@@ -10,10 +10,13 @@ from orchestrator.executors.protocol import Executor
 ExecutorKind = Literal["ray", "serial"]
 
 
-def open_executor(kind: ExecutorKind, workers: int | None, address: str | None) -> Executor:
+def open_executor(
+    kind: ExecutorKind, workers: int | None, address: str | None, dashboard: bool = False
+) -> Executor:
     """Each is imported only when asked for: Ray and torch take seconds.
 
-    Raises UsageError when there is no cluster at `address`.
+    Raises UsageError when there is no cluster at `address`, and where a dashboard is asked for and
+    what Ray needs for it is not installed.
     """
     if kind == "serial":
         from orchestrator.executors.serial import SerialExecutor
@@ -25,4 +28,4 @@ def open_executor(kind: ExecutorKind, workers: int | None, address: str | None) 
         os.environ["RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER"] = "0"
     from orchestrator.executors.ray import RayExecutor
 
-    return RayExecutor(workers, address)
+    return RayExecutor(workers, address, dashboard)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import logging
 import os
-import socket
+import sys
 from collections import deque
 from dataclasses import dataclass, field
+from importlib import import_module
 from typing import Any
 
+from orchestrator import libraries
 from orchestrator.cores import usable_cores
 from orchestrator.errors import UsageError
+from orchestrator.executors.address import check_answer
 from orchestrator.interruption import own_handler_kept
 from orchestrator.storage.store import Artifact
 from orchestrator.work.jobs import BuildJob, Job, PlayJob, Report
@@ -21,7 +24,6 @@ os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")
 
 OBJECT_STORE_BYTES = 512 * 2**20
 JOBS_PER_WORKER = 2  # one running, one waiting, so that no worker idles between jobs
-SECONDS_TO_ANSWER = 5.0  # of a cluster's head node
 SECONDS_BETWEEN_CHECKS = 5.0  # for nodes that have gone, where no job finishes
 
 import ray  # noqa: E402
@@ -31,6 +33,7 @@ from ray.exceptions import RayError  # noqa: E402
 
 @ray.remote(num_cpus=1, max_retries=0)
 def _build(job: BuildJob, roles: list[str], *artifacts: Artifact) -> Report:
+    libraries.give_places()
     from orchestrator.work.worker import build, use_one_thread
 
     use_one_thread()
@@ -42,6 +45,7 @@ class _Player:
     """A block player with the artifacts it has been shown so far."""
 
     def __init__(self) -> None:
+        libraries.give_places()
         from orchestrator.work.playing import BlockPlayer
         from orchestrator.work.worker import use_one_thread
 
@@ -76,10 +80,12 @@ class _Flight:
 class RayExecutor:
     """Runs on this machine's cores, or on the cluster at `address`."""
 
-    def __init__(self, workers: int | None = None, address: str | None = None) -> None:
+    def __init__(
+        self, workers: int | None = None, address: str | None = None, dashboard: bool = False
+    ) -> None:
         self._owned = not ray.is_initialized()
         if self._owned:
-            _start(workers, address)
+            _start(workers, address, dashboard)
         self._most_workers = workers
         self.workers = self._capacity()
         self._references: dict[str, Any] = {}
@@ -184,19 +190,20 @@ class RayExecutor:
             self._dismiss(slot)
 
 
-def _start(workers: int | None, address: str | None) -> None:
+def _start(workers: int | None, address: str | None, dashboard: bool) -> None:
     common: dict[str, Any] = {"log_to_driver": False, "logging_level": logging.ERROR}
     # A worker is one thread; more would change the bytes.
     environment = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
     if address is not None:
         address = _started_here() if address == "auto" else address
         try:
-            _can_connect(address)
+            check_answer(address)
         except OSError as error:
             raise UsageError(f"no Ray cluster at {address}: {_first_line(error)}") from error
+        there = {"env_vars": environment | {"MUJOCO_GL": "disable"}}  # no worker draws
         try:
             with own_handler_kept():
-                ray.init(address=address, runtime_env={"env_vars": environment}, **common)
+                ray.init(address=address, runtime_env=there, **common)
         except (OSError, ValueError, RuntimeError) as error:
             raise UsageError(
                 f"something answers at {address}, but no Ray cluster lets this process in "
@@ -207,14 +214,31 @@ def _start(workers: int | None, address: str | None) -> None:
             ) from error
         return
     os.environ.update(environment)
+    libraries.give_ray_a_token()
+    if dashboard:
+        _check_dashboard()
     with own_handler_kept():
-        ray.init(
+        started = ray.init(
             address="local",
             num_cpus=workers or usable_cores(),
-            include_dashboard=False,
+            include_dashboard=dashboard,  # on loopback
             object_store_memory=OBJECT_STORE_BYTES,
+            _temp_dir=libraries.ray_folder(),
             **common,
         )
+    if dashboard:
+        print(f"Ray's dashboard: http://{started.dashboard_url}", file=sys.stderr)
+
+
+def _check_dashboard() -> None:
+    """Without its packages Ray starts one that answers and shows nothing."""
+    try:
+        import_module("ray.dashboard.optional_deps")
+    except ImportError as error:
+        raise UsageError(
+            f"--dashboard: {error.name} is not installed; run "
+            f"`pip install 'ray[default]=={ray.__version__}'`"
+        ) from error
 
 
 def _started_here() -> str:
@@ -226,13 +250,6 @@ def _started_here() -> str:
             "RAY_ADDRESS is not set; name the head, as in --address HEAD:6379"
         )
     return found
-
-
-def _can_connect(address: str) -> None:
-    """Find out in seconds that nobody is there; Ray itself tries for minutes."""
-    host, _, port = address.rpartition(":")
-    if host and port.isdigit():
-        socket.create_connection((host, int(port)), SECONDS_TO_ANSWER).close()
 
 
 def _first_line(error: Exception) -> str:

@@ -52,7 +52,7 @@ def read_toml(name_or_file: str, packaged: Traversable, what: str) -> tuple[Plai
             f"no {what} {name_or_file!r}: neither a file nor one of {', '.join(names)}"
         )
     try:
-        return tomllib.loads(data.decode()), where
+        return tomllib.loads(data.decode("utf-8-sig")), where
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise UsageError(f"{where}: not valid TOML: {error}") from error
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Callable, Iterable
+from contextlib import closing
 
 from analysis.schema import SEPARATOR, SPEC
 from orchestrator.benchmarks.registry import ENTRIES
@@ -13,7 +14,7 @@ from orchestrator.spec.origin import origin
 from orchestrator.spec.spec import Spec, TableSpec, differences, plain_spec, spec_from_plain
 from orchestrator.spec.structure import Plain, to_plain
 from orchestrator.storage.provenance import matters
-from orchestrator.storage.rundir import PLANNED, RunDirectory
+from orchestrator.storage.rundir import LEDGER, PLANNED, TRACKING, RunDirectory
 from orchestrator.work.plan import Plan, make_plan
 
 IDENTITY = "identity.json"
@@ -47,15 +48,13 @@ def claim(
 ) -> str:
     """As `claim_for_spec`, for whatever is described; `differing` compares it with what is there.
 
-    Its scores depend on what these plans make and play.
+    Its scores depend on what these plans make and play. What was claimed by a command that then
+    failed, before anything was made or played, is claimed anew.
     """
     now = matters(plans)
     identity = directory.read_json(IDENTITY)
     if identity is None:
-        identity = {"run_id": uuid.uuid4().hex, "matters": now}
-        directory.write_json(SPEC, description)
-        directory.write_json(IDENTITY, identity)
-        return str(identity["run_id"])
+        return _claim_anew(directory, description, now)
     changed = differing()
     before = identity["matters"]
     changed += [
@@ -63,12 +62,36 @@ def claim(
         for name in sorted(now)
         if before.get(name) != now[name]
     ]
+    if changed and is_unused(directory):
+        return _claim_anew(directory, description, now)
     if changed:
         raise ChangedError(
             f"{directory.path} was made under something else; choose another --out (finished "
             "artifacts and blocks are shared), or go back to:\n  " + "\n  ".join(changed)
         )
     return str(identity["run_id"])
+
+
+def _claim_anew(directory: RunDirectory, description: Plain, now: Plain) -> str:
+    """The identity goes first and comes last: a directory without one is nobody's."""
+    for name in (IDENTITY, TRACKING):
+        (directory.path / name).unlink(missing_ok=True)
+    run_id = uuid.uuid4().hex
+    directory.write_json(SPEC, description)
+    directory.write_json(IDENTITY, {"run_id": run_id, "matters": now})
+    return run_id
+
+
+def is_unused(directory: RunDirectory) -> bool:
+    """Whether a claimed directory has no block and no artifact on record, parts included."""
+    if directory.is_suite:
+        return all(
+            is_unused(part) for part in directory.parts.values() if (part.path / SPEC).is_file()
+        )
+    if not (directory.path / LEDGER).is_file():
+        return True
+    with closing(directory.ledger(read_only=True)) as ledger:
+        return not ledger.finished() and not ledger.artifacts()
 
 
 def planned(plan: Plan) -> Plain:

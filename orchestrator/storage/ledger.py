@@ -13,7 +13,7 @@ import numpy as np
 from safetensors.numpy import load, save
 
 from orchestrator.errors import IncompleteError, NondeterminismError, StorageError
-from orchestrator.storage.store import storage_errors
+from orchestrator.storage.store import make_folder
 
 SCHEMA = """
 BEGIN;
@@ -98,8 +98,7 @@ class Ledger:
                     self._db.executescript(SCHEMA)
                 self._db.execute("PRAGMA query_only = 1")
                 return
-            with storage_errors(path):
-                path.parent.mkdir(parents=True, exist_ok=True)
+            make_folder(path.parent)
             self._db = sqlite3.connect(path, timeout=30, isolation_level=None)
             self._db.execute("PRAGMA journal_mode=WAL")
             self._db.execute("PRAGMA synchronous=FULL")

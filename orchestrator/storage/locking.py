@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from orchestrator.errors import LockedError
-from orchestrator.storage.store import storage_errors
+from orchestrator.storage.store import make_folder, storage_errors
 
 STORE_LOCK = "in-use.lock"  # another name than a run directory's: the two may be one folder
 
@@ -19,7 +19,7 @@ STORE_LOCK = "in-use.lock"  # another name than a run directory's: the two may b
 def held(folder: Path) -> Iterator[None]:
     """Hold a run directory; LockedError at once, naming the holder, if somebody else does."""
     with _locked_file(folder / "lock") as descriptor:
-        if not _take(descriptor, fcntl.LOCK_EX):
+        if not _take(descriptor, folder, fcntl.LOCK_EX):
             holder = os.read(descriptor, 200).decode(errors="replace").strip()
             raise LockedError(
                 f"{folder} is in use by {holder or 'another process'}; "
@@ -36,7 +36,7 @@ def held(folder: Path) -> Iterator[None]:
 def shared(store: Path, say: Callable[[str], None]) -> Iterator[None]:
     """Use a store beside others. Says so, and waits, where somebody has it `alone`."""
     with _locked_file(store / STORE_LOCK) as descriptor:
-        if not _take(descriptor, fcntl.LOCK_SH):
+        if not _take(descriptor, store, fcntl.LOCK_SH):
             say(f"waiting for the gc of {store} to end")
             fcntl.flock(descriptor, fcntl.LOCK_SH)
         yield
@@ -46,7 +46,7 @@ def shared(store: Path, say: Callable[[str], None]) -> Iterator[None]:
 def alone(store: Path) -> Iterator[None]:
     """Have a store that nobody else uses; LockedError at once if somebody does."""
     with _locked_file(store / STORE_LOCK) as descriptor:
-        if not _take(descriptor, fcntl.LOCK_EX):
+        if not _take(descriptor, store, fcntl.LOCK_EX):
             raise LockedError(
                 f"a run or a sweep is at work over {store}, and what it has made and not yet used "
                 "must not be deleted; wait for it"
@@ -57,8 +57,8 @@ def alone(store: Path) -> Iterator[None]:
 @contextmanager
 def _locked_file(path: Path) -> Iterator[int]:
     """A file to lock; closing it drops the lock."""
+    make_folder(path.parent)
     with storage_errors(path.parent):
-        path.parent.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
     try:
         yield descriptor
@@ -66,9 +66,10 @@ def _locked_file(path: Path) -> Iterator[int]:
         os.close(descriptor)
 
 
-def _take(descriptor: int, kind: int) -> bool:
+def _take(descriptor: int, folder: Path, kind: int) -> bool:
     try:
-        fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
+        with storage_errors(folder):  # some file systems have no locks
+            fcntl.flock(descriptor, kind | fcntl.LOCK_NB)
     except BlockingIOError:
         return False
     return True

@@ -18,6 +18,8 @@ from orchestrator.storage.store import USUAL_STORE, write_atomically
 
 FINISHED = "finished"
 PLANNED = "plan.json"
+LEDGER = "ledger.sqlite"
+TRACKING = "tracking.json"
 SWEEP = "sweep.json"
 REPORT_SOURCES = (".py", ".csv", ".html", ".css", ".js")
 
@@ -44,7 +46,7 @@ class RunDirectory:
         self.path = path
 
     def ledger(self, *, read_only: bool = False) -> Ledger:
-        path = self.path / "ledger.sqlite"
+        path = self.path / LEDGER
         if read_only and not path.is_file():
             raise UsageError(f"{self.path} has no ledger yet: nothing was played there")
         return Ledger(path, read_only=read_only)
@@ -121,10 +123,9 @@ class RunDirectory:
 
     def asked(self) -> Plain:
         """spec.json, of a run or a suite. UsageError where there is neither."""
-        path = self.path / SPEC
-        if not path.is_file():
+        plain: Plain | None = self.read_json(SPEC)
+        if plain is None:
             raise UsageError(f"{self.path} is no run directory: it has no spec.json")
-        plain: Plain = self.read_json(SPEC)
         return plain
 
     @property
@@ -153,12 +154,14 @@ class RunDirectory:
         write_atomically(self.path / name, (text + "\n").encode(errors="surrogateescape"))
 
     def read_json(self, name: str) -> Any:
-        """None where there is no such file. Raises StorageError for one that is damaged."""
+        """None where there is no such file. StorageError for one that cannot be read."""
         path = self.path / name
-        if not path.is_file():
-            return None
         try:
             return json.loads(path.read_text(encoding="utf-8", errors="surrogateescape"))
+        except (FileNotFoundError, NotADirectoryError):
+            return None
+        except OSError as error:
+            raise StorageError(f"cannot read {path}: {error.strerror}; name another") from error
         except ValueError as error:
             raise StorageError(
                 f"{path} is damaged: {error}; move it away and run the same command again, or "

@@ -21,6 +21,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load as load_safetensors
 from safetensors.numpy import save as save_safetensors
 
+from analysis.files import sync
 from orchestrator.errors import IncompleteError, StorageError, UsageError
 
 USUAL_STORE = Path("runs/store")
@@ -86,14 +87,14 @@ class Store:
         }
         with storage_errors(self.root):
             try:
-                temporary.mkdir(parents=True)
+                make_folder(temporary)
                 for name, data in files.items():
                     write_durably(temporary / name, data)
                 text = json.dumps(manifest, sort_keys=True, indent=1)
                 write_durably(temporary / "manifest.json", text.encode())
-                final.parent.mkdir(parents=True, exist_ok=True)
+                make_folder(final.parent)
                 _replace_folder(temporary, final)
-                sync_folder(final.parent)
+                sync(final.parent)
             finally:
                 shutil.rmtree(temporary, ignore_errors=True)
         return artifact.digest
@@ -134,7 +135,7 @@ class Store:
     def manifest(self, kind: str, key: str) -> dict[str, Any]:
         path = self.path(kind, key) / "manifest.json"
         try:
-            manifest = json.loads(path.read_text())
+            manifest = json.loads(path.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             raise CorruptArtifactError(f"{path}: unreadable") from error
         if not _is_manifest(manifest):
@@ -145,7 +146,7 @@ class Store:
         """Set a damaged artifact aside for inspection; it counts as missing from then on."""
         aside = self.root / "corrupt" / f"{kind}-{key}-{uuid.uuid4().hex[:8]}"
         with storage_errors(self.root):
-            aside.parent.mkdir(parents=True, exist_ok=True)
+            make_folder(aside.parent)
             with suppress(FileNotFoundError):  # another run over this store was faster
                 self.path(kind, key).rename(aside)
         return aside
@@ -153,8 +154,7 @@ class Store:
     def checkpoints(self, key: str) -> Path:
         """Where trainings of an artifact may leave checkpoints: only who sees this store does."""
         folder = self.checkpoint_folder(key)
-        with storage_errors(self.root):
-            folder.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(folder.parent)
         return folder
 
     def drop_checkpoints(self, key: str) -> None:
@@ -241,27 +241,21 @@ def write_durably(path: Path, data: bytes) -> None:
 def write_atomically(path: Path, data: bytes) -> None:
     """Replace a file so that a reader, or a crash, sees the old content or the new, whole."""
     with storage_errors(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
         temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
         try:
             write_durably(temporary, data)
             temporary.replace(path)
-            sync_folder(path.parent)
+            sync(path.parent)
         finally:
             temporary.unlink(missing_ok=True)
 
 
-def sync_folder(folder: Path) -> None:
-    """Make a rename in this folder survive a power cut."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
-
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-REFUSED = (errno.EROFS, errno.EACCES, errno.EPERM, errno.EEXIST, errno.ENOTDIR)
+REFUSED = (
+    errno.EROFS, errno.EACCES, errno.EPERM, errno.EEXIST, errno.ENOTDIR, errno.EISDIR, errno.ELOOP,
+    errno.ENAMETOOLONG, errno.ENOTSUP, errno.ENOLCK, errno.EIO, errno.ESTALE,
+)  # fmt: skip
 
 
 @contextmanager
@@ -272,7 +266,23 @@ def storage_errors(where: Path) -> Iterator[None]:
     except OSError as error:
         if error.errno not in FULL + REFUSED:
             raise
-        advice = "make room" if error.errno in FULL else "choose another place"
-        raise StorageError(
-            f"cannot write {where}: {error.strerror}; {advice} and run the same command again"
-        ) from error
+        raise _cannot_write(where, error) from error
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder and those above it. StorageError where that fails: the place is the reason.
+
+    Elsewhere a file that is not found may be a mistake of ours; here it is, as in /proc, a folder
+    in which nothing can be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _cannot_write(folder, error) from error
+
+
+def _cannot_write(where: Path, error: OSError) -> StorageError:
+    advice = "make room" if error.errno in FULL else "choose another place"
+    return StorageError(
+        f"cannot write {where}: {error.strerror}; {advice} and run the same command again"
+    )

@@ -50,13 +50,13 @@ def digest(files: Mapping[str, Path]) -> str:
 
 def read_json(path: Path, default: Any) -> Any:
     """The content of a JSON file; the default where there is none."""
-    return json.loads(path.read_text()) if path.is_file() else default
+    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else default
 
 
 def read_receipt(run_dir: Path) -> Receipt | None:
     """What MLflow has seen of a run; None where that is not known."""
     try:
-        return Receipt(**json.loads((run_dir / "tracking.json").read_text()))
+        return Receipt(**json.loads((run_dir / "tracking.json").read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError):
         return None  # an unreadable receipt only costs a publish
 

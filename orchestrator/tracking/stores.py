@@ -26,6 +26,13 @@ SETTINGS = {
 TURN_SECONDS = 30.0  # wait for another skillstitch that writes to the same SQLite store
 LOCK_SECONDS = 10.0  # wait for any other program that has locked it
 
+SQLITE = "sqlite:///"
+QUERY = re.compile(r"\w+=[\w.+-]*(&\w+=[\w.+-]*)*")  # of a SQLite store: timeout=5
+BEFORE_HOST = re.compile(r"//([^/:@\s]*|[^/:@\s]*:[^\s'\"]*)@")
+IN_QUERY = re.compile(
+    r"([?&;][\w.-]*(?:user|pass|pwd|secret|token|key)[\w.-]*=)[^&;\s'\"]*", re.IGNORECASE
+)
+
 
 class TrackingError(Exception):
     """Tracking cannot be used now; the message says why."""
@@ -37,13 +44,19 @@ def default_uri(root: Path) -> str:
 
 
 def without_password(text: str) -> str:
-    """A URI, or a text with URIs, without the users and passwords in them."""
-    return re.sub(r"//[^/@\s]*@", "//", text)
+    """A URI, or a text with URIs, without the users and passwords in them.
+
+    Passwords may have "@" and "/" in them, so all up to a word's last "@" goes.
+    """
+    return IN_QUERY.sub(r"\1***", BEFORE_HOST.sub("//", text))
 
 
 def _database(uri: str) -> Path | None:
     """The file of a SQLite store, None for any other."""
-    return Path(uri.removeprefix("sqlite:///")) if uri.startswith("sqlite:///") else None
+    if not uri.startswith(SQLITE):
+        return None
+    path, _, query = uri.removeprefix(SQLITE).rpartition("?")
+    return Path(path if QUERY.fullmatch(query) and path else uri.removeprefix(SQLITE))
 
 
 def is_gone(uri: str) -> bool:
@@ -64,13 +77,13 @@ def turn_to_write(uri: str) -> Iterator[None]:
     if database is None:
         yield
         return
-    if "?" in uri or "%" in uri:
+    if "?" in str(database) or "%" in uri:
         raise TrackingError(
             f"MLflow cannot keep a SQLite store at a path with “?” or “%”, as {database} has: "
             "name another with --tracking-uri sqlite:///FILE"
         )
     database.parent.mkdir(parents=True, exist_ok=True)
-    with database.with_name(f"{database.name}.lock").open("w") as file:
+    with database.with_name(f"{database.name}.lock").open("wb") as file:
         deadline = time.monotonic() + TURN_SECONDS
         while not _try_lock(file.fileno()):
             if time.monotonic() > deadline:

@@ -59,8 +59,8 @@ def read_views(
 
     training: in place of `training.json`.
     """
-    plain = json.loads((run_dir / SPEC).read_text())
-    provenance = json.loads((run_dir / PROVENANCE).read_text())
+    plain = json.loads((run_dir / SPEC).read_text(encoding="utf-8"))
+    provenance = json.loads((run_dir / PROVENANCE).read_text(encoding="utf-8"))
     training = read_json(run_dir / TRAINING, []) if training is None else training
     spec = RunSpec.from_dict(plain)
     parent = RunView(

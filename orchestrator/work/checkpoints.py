@@ -102,7 +102,7 @@ class CheckpointFile:
         text = json.dumps(news, default=int)
         with suppress(OSError):
             self.path.parent.mkdir(exist_ok=True)
-            self.path.with_name(f"{self.path.name}{NEWS}").write_text(text)
+            self.path.with_name(f"{self.path.name}{NEWS}").write_text(text, encoding="utf-8")
 
     def read(self) -> tuple[dict[str, torch.Tensor], dict[str, Any]] | None:
         try:
@@ -156,7 +156,7 @@ def _told(folder: Path, since: float) -> list[tuple[float, dict[str, Any]]]:
         for file in sorted(folder.glob(f"*{NEWS}")):
             with suppress(OSError, ValueError):  # it is being written, or is gone
                 if (when := file.stat().st_mtime) >= since:
-                    told.append((when, json.loads(file.read_text())))
+                    told.append((when, json.loads(file.read_text(encoding="utf-8"))))
     return told
 
 

@@ -39,7 +39,6 @@ def write_table(sweep: SweepSpec, player: SpecPlayer, path: Path) -> None:
     spec = table_spec(sweep)
     player.play(spec)
     directory, plan = RunDirectory(path), replace(make_plan(spec), illustrations={})
-    path.mkdir(parents=True, exist_ok=True)
     directory.write_json(SPEC, describe(spec))
     counts = write_readable(plan, player.store, player.ledger, directory)
     directory.write_json(PROVENANCE, provenance() | {"counts": counts})

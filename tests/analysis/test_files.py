@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from analysis import files
-from analysis.files import replaced_file, replaced_folder
+from analysis.files import can_write, replaced_file, replaced_folder, sync
 
 REWRITE_FOR_EVER = """
 import sys
@@ -83,3 +83,19 @@ def test_what_killed_processes_left_is_removed_and_what_others_write_is_not(tmp_
     (tmp_path / f".folder.{os.getppid()}.tmp").mkdir()
     write(tmp_path / "folder", "a")
     assert names(tmp_path) == [f".folder.{os.getppid()}.tmp", "folder"]
+
+
+def test_a_file_system_that_cannot_flush_folders(tmp_path: Path) -> None:
+    for folder in (tmp_path, Path("/proc")):
+        sync(folder)
+    with pytest.raises(FileNotFoundError):
+        sync(tmp_path / "absent")
+
+
+def test_whether_a_file_can_be_made(tmp_path: Path) -> None:
+    """Permissions alone say that root may write to /proc."""
+    (tmp_path / "file").touch()
+    assert can_write(tmp_path)
+    assert names(tmp_path) == ["file"]
+    for folder in (tmp_path / "file", tmp_path / "absent", Path("/proc")):
+        assert not can_write(folder)

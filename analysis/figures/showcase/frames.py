@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from analysis.backends import PLATFORMS, backends
 from analysis.figures.showcase.scenes import NoPictureError
 
-BACKENDS = ("egl", "osmesa")  # of MuJoCo, those that need no display
 MOST_SECONDS = 300  # to start and draw a sheet; a driver that hangs must not hang the report
 SECONDS_A_FRAME = 2.0  # more, for each
 
@@ -23,10 +23,10 @@ def render_frames(scene: Mapping[str, Any], positions: np.ndarray) -> np.ndarray
     with TemporaryDirectory() as folder:
         names = ("scene.json", "positions.npy", "frames.npy")
         described, recorded, drawn = (Path(folder) / name for name in names)
-        described.write_text(json.dumps(scene))
+        described.write_text(json.dumps(scene), encoding="utf-8")
         np.save(recorded, positions)
         complaints = []
-        for backend in BACKENDS:
+        for backend in backends():
             seconds = MOST_SECONDS + SECONDS_A_FRAME * len(positions)
             complaint = _render(backend, seconds, described, recorded, drawn)
             if not complaint:
@@ -44,7 +44,7 @@ def _render(backend: str, seconds: float, *files: Path) -> str:
     try:
         run = subprocess.run(
             [sys.executable, "-m", "analysis.render", *map(str, files)],
-            env={**os.environ, "MUJOCO_GL": backend, "PYOPENGL_PLATFORM": backend},
+            env=os.environ | {"MUJOCO_GL": backend, "PYOPENGL_PLATFORM": PLATFORMS[backend]},
             cwd=Path(__file__).parents[3],
             capture_output=True,
             text=True,

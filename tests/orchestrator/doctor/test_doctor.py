@@ -1,6 +1,9 @@
 """The doctor on this machine, and its judgement of machines that are worse."""
 
 import importlib.metadata
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -17,6 +20,7 @@ from orchestrator.doctor import (
     packages,
     selftest,
     storage,
+    surroundings,
 )
 from orchestrator.doctor.finding import GIB
 
@@ -33,7 +37,7 @@ def test_this_machine_has_no_fault(tmp_path: Path) -> None:
     assert {"Python", "torch", "numpy", "mujoco", "cores", "disk", "self test"} <= names.keys()
     assert "pytest" not in names  # extras are nobody's duty
     assert all(finding.advice for finding in findings if finding.status != "ok")
-    assert list((tmp_path / "runs").iterdir()) == []
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_root_that_cannot_be_written_to(tmp_path: Path) -> None:
@@ -45,6 +49,56 @@ def test_a_root_that_cannot_be_written_to(tmp_path: Path) -> None:
     assert "--out" in finding.advice
     (finding,) = storage.check_root(file / "below")
     assert finding.status == "fault"
+
+
+def odd_machine(tmp_path: Path, package: str, mistake: str) -> dict[str, Finding]:
+    """What the doctor says where much is amiss, itself in a process of its own."""
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / f"{package}.py").write_text(mistake)
+    environment = {
+        "PYTHONPATH": os.pathsep.join([str(tmp_path / "broken"), os.getcwd()]),
+        "HOME": "/proc/none",
+        "TMPDIR": str(tmp_path / ("t" * 81)),
+        "MUJOCO_GL": "nonsense",
+    }
+    answer = subprocess.run(
+        [sys.executable, "-m", "orchestrator.cli", "doctor"],
+        cwd=tmp_path,
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+    )
+    assert (answer.returncode, answer.stderr) == (1, "")
+    assert [path.name for path in tmp_path.iterdir()] == ["broken"]  # nothing is made
+    parts = [line.split(None, 1) for line in answer.stdout.splitlines()]
+    return {
+        name: Finding(name, status, said)  # type: ignore[arg-type]
+        for status, rest in parts
+        for name, _, said in [rest.partition(": ")]
+    }
+
+
+@pytest.mark.parametrize(
+    ("package", "mistake", "said"),
+    [
+        ("mujoco", "raise ImportError('libGL.so.1 is missing')", "ImportError: libGL.so.1"),
+        ("torch", "import ctypes; ctypes.CDLL('libtorch.so')", "OSError: libtorch.so"),
+        ("torch", "import os, signal; os.kill(os.getpid(), 4)", "ends Python with SIGILL"),
+    ],
+)
+def test_it_starts_on_odd_machines_and_says_what_to_do(
+    tmp_path: Path, package: str, mistake: str, said: str
+) -> None:
+    found = odd_machine(tmp_path, package, mistake)
+    assert found[f"importing {package}"].status == "fault"
+    assert said in found[f"importing {package}"].found
+    for name, advice in {
+        "home": "set HOME to",
+        "temporary files": "set TMPDIR or RAY_TMPDIR to",
+        "MUJOCO_GL": "unset it",
+    }.items():
+        assert found[name].status == "warn"
+        assert advice in found[name].found
 
 
 @pytest.mark.parametrize(
@@ -104,6 +158,19 @@ def test_a_source_tree_that_was_never_installed(monkeypatch: pytest.MonkeyPatch)
         (packages.judge_sqlite((3, 30, 9)), "fault"),
         (machine.judge_rendering(["EGL"]), "ok"),
         (machine.judge_rendering([]), "warn"),
+        (surroundings.judge_import("torch", 0, ""), "ok"),
+        (surroundings.judge_import("torch", 1, "OSError: libtorch.so: cannot open"), "fault"),
+        (surroundings.judge_import("torch", -4, ""), "fault"),
+        (surroundings.judge_home(Path("/root"), True), "ok"),
+        (surroundings.judge_home(Path("/root"), False), "warn"),
+        (surroundings.judge_numba(None, True), "ok"),
+        (surroundings.judge_numba("/data/numba", True), "ok"),
+        (surroundings.judge_numba(None, False), "fault"),
+        (surroundings.judge_temporary(None), "ok"),
+        (surroundings.judge_temporary("/dev/shm/skillstitch-0/ray"), "warn"),
+        (surroundings.judge_drawing("egl", 0, ""), "ok"),
+        (surroundings.judge_drawing("osmesa", 1, "AttributeError: glGetError"), "warn"),
+        (surroundings.judge_drawing("glfw", -11, ""), "warn"),
         (selftest.judge_determinism({"w": b"1"}, {"w": b"1"}, 0.5), "ok"),
         (selftest.judge_determinism({"w": b"1"}, {"w": b"2"}, 0.5), "fault"),
     ],

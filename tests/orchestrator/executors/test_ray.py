@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -18,6 +19,7 @@ from orchestrator.errors import UsageError
 from orchestrator.executors import open_executor
 from orchestrator.executors import ray as ray_executor
 from orchestrator.executors.protocol import Executor
+from orchestrator.reproduction import Settings
 from orchestrator.work.jobs import BlockTask, BuildJob, Job, PlayJob, Report
 from orchestrator.work.plan import Plan
 from tests.orchestrator.executors.processes import titled
@@ -104,6 +106,23 @@ def test_a_cluster_of_this_machine_that_is_gone(tmp_path: Path) -> None:
     (tmp_path / "ray" / "ray_current_cluster").write_text("127.0.0.1:1")
     told = refused("auto", RAY_TMPDIR=str(tmp_path), RAY_ADDRESS="")
     assert told.startswith("no Ray cluster at 127.0.0.1:1: ")
+
+
+def test_a_dashboard_without_its_packages_says_what_to_install() -> None:
+    """Ray itself would start one that shows nothing."""
+    if find_spec("aiohttp_cors") is not None:
+        pytest.skip("they are installed")
+    script = "from orchestrator.executors import open_executor; open_executor('ray', 1, None, True)"
+    answer = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    last = answer.stderr.splitlines()[-1]
+    assert last.startswith("orchestrator.errors.UsageError: --dashboard: aiohttp_cors is not inst")
+    assert "pip install 'ray[default]==" in last
+
+
+def test_a_dashboard_is_for_a_ray_of_its_own(tmp_path: Path) -> None:
+    for other in ({"executor": "serial"}, {"address": "head:6379"}):
+        with pytest.raises(UsageError, match="a cluster has its own"):
+            Settings(tmp_path, dashboard=True, **other)  # type: ignore[arg-type]
 
 
 @pytest.fixture

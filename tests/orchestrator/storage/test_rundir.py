@@ -7,6 +7,7 @@ import re
 import signal
 import socket
 import time
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -174,3 +175,21 @@ def test_finished_means_with_nothing_given_up(directory: RunDirectory) -> None:
 
 def test_runs_are_kept_by_name_and_scale(spec: Spec) -> None:
     assert default_out(spec) == Path("runs/tiny-paper")
+
+
+def test_a_directory_in_which_nothing_was_made_is_claimed_anew(
+    directory: RunDirectory, spec: Spec
+) -> None:
+    """As after an address that was wrong."""
+    before = claim_for_spec(directory, spec)
+    directory.ledger().close()
+    directory.write_json("tracking.json", {"of": before})
+    other = replace(spec, episodes=7)
+    assert claim_for_spec(directory, other) != before
+    assert spec_of(directory) == other
+    assert not (directory.path / "tracking.json").exists()
+
+    with closing(directory.ledger()) as ledger:
+        ledger.record_artifact("key", "digest")
+    with pytest.raises(ChangedError, match="episodes: 7 → 6"):
+        claim_for_spec(directory, spec)

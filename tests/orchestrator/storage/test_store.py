@@ -25,6 +25,7 @@ from orchestrator.storage.store import (
     Artifact,
     CorruptArtifactError,
     Store,
+    make_folder,
     storage_errors,
     write_atomically,
 )
@@ -323,6 +324,19 @@ def test_files_are_replaced_whole_or_not_at_all(tmp_path: Path) -> None:
 def test_errors_of_other_kinds_are_not_blamed_on_the_disk(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError), storage_errors(tmp_path):
         raise FileNotFoundError(errno.ENOENT, "no such file")
+
+
+NOWHERE = Path("/proc/none")  # where even root can make nothing
+
+
+def test_a_folder_that_cannot_be_made(tmp_path: Path) -> None:
+    for folder in (NOWHERE / "folder", tmp_path / ("a" * 300)):
+        with pytest.raises(StorageError, match=rf"cannot write {folder}.*choose another place"):
+            make_folder(folder)
+        with pytest.raises(StorageError, match="choose another place"):
+            Store(folder).write("agent", KEY, weights(), {})
+        with pytest.raises(StorageError, match="choose another place"):
+            write_atomically(folder / "spec.json", b"")
 
 
 @pytest.fixture

@@ -30,6 +30,41 @@ def test_a_server_that_is_down_is_said_in_one_line(run_dir: Path) -> None:
     assert not publish(run_dir, uri, "FINISHED").skipped
 
 
+@pytest.mark.parametrize(
+    ("uri", "said"),
+    [
+        ("http://server:5000", "http://server:5000"),
+        ("http://user:word@server:5000", "http://server:5000"),
+        ("http://token@server", "http://server"),
+        ("postgresql://u:p@ss@host/db", "postgresql://host/db"),
+        ("postgresql://u:p/w@host/db", "postgresql://host/db"),
+        ("postgresql://u:p?w@host/db", "postgresql://host/db"),
+        (
+            "postgresql://host/db?user=u&password=secret&sslmode=require",
+            "postgresql://host/db?user=***&password=***&sslmode=require",
+        ),
+        ("sqlite:////runs/mlflow.db?timeout=5", "sqlite:////runs/mlflow.db?timeout=5"),
+        ("no http://u:p@a and 'http://v:q/@b': gone", "no http://a and 'http://b': gone"),
+    ],
+)
+def test_users_and_passwords_are_left_out(uri: str, said: str) -> None:
+    assert stores.without_password(uri) == said
+
+
+def test_a_sqlite_store_with_a_query(run_dir: Path, uri: str, tmp_path: Path) -> None:
+    with_query = f"{uri}?timeout=5&check_same_thread=false"
+    outcome = publish(run_dir, with_query, "FINISHED")
+    assert outcome.ok, outcome.error
+    assert Seen(uri).states() == ("FINISHED", {"FINISHED"})
+    assert not [path.name for path in tmp_path.iterdir() if "?" in path.name]
+    assert stores.is_gone(f"sqlite:///{tmp_path}/absent.db?timeout=5")
+
+
+def test_a_path_with_a_question_mark_is_no_query(run_dir: Path, tmp_path: Path) -> None:
+    outcome = publish(run_dir, f"sqlite:///{tmp_path}/seed?1/mlflow.db", "FINISHED")
+    assert "a path with “?” or “%”" in outcome.error
+
+
 @contextmanager
 def locked(database: Path) -> Iterator[None]:
     """Another process holds the database."""

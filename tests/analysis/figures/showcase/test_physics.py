@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from analysis.backends import PLATFORMS
 from analysis.figures.showcase import frames, scenes
 from analysis.figures.showcase.frames import render_frames
 from analysis.figures.showcase.physics import (
@@ -164,7 +165,8 @@ def test_frames_show_the_positions_and_are_always_the_same() -> None:
 
 
 def test_without_a_backend_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(frames, "BACKENDS", ("no-such-backend",))
+    monkeypatch.setitem(PLATFORMS, "no-such-backend", "none")
+    monkeypatch.setattr(frames, "backends", lambda: ["no-such-backend"])
     with pytest.raises(NoPictureError, match="install libegl1 or libosmesa6"):
         render_frames(SCENE, np.zeros((1, 7)))
 
