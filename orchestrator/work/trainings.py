@@ -98,7 +98,9 @@ class GrowingCurves:
         kind, key = recipe.kind, recipe.key
         if key not in self._finished and (kind, key) in self.store:
             with suppress(OSError, ValueError):  # it is being replaced
-                info = json.loads((self.store.path(kind, key) / "info.json").read_text())
+                info = json.loads(
+                    (self.store.path(kind, key) / "info.json").read_text(encoding="utf-8")
+                )
                 self._finished[key] = info.get("curves", {})
         if key in self._finished:
             return self._finished[key]
