@@ -139,7 +139,10 @@ class Ledger:
 
     def finished(self) -> set[str]:
         with self._storage_errors():
-            return {key for (key,) in self._db.execute("SELECT key FROM blocks")}
+            keys = {key for (key,) in self._db.execute("SELECT key FROM blocks")}
+            if None in keys:  # as where the end of the file is missing
+                raise sqlite3.DatabaseError("a block has no name")
+            return keys
 
     def outcomes(self, keys: Iterable[str]) -> Iterator[tuple[str, Outcome]]:
         """Recorded outcomes in the order asked for; keys not recorded are skipped.

@@ -1,4 +1,4 @@
-"""How actions move the robot, from demonstrations: a linear model of its numbers alone."""
+"""How actions move the robot, from demonstrations: a linear model of all that is no object."""
 
 from __future__ import annotations
 
@@ -47,8 +47,10 @@ def before_contact(data: Transitions, factors: Factors, skills: Sequence[str]) -
 
     That is, by more than a tenth of what it usually moves, from where it stood at first. A hand
     that holds an object does not move as it does alone. All transitions where a skill is about
-    nothing.
+    nothing, as where there is no object.
     """
+    if not factors.own:
+        return np.ones(len(data), dtype=bool)
     usual = usual_moves(data, factors, skills)
     free = np.ones(len(data), dtype=bool)
     starts = data.episode_starts

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 import torch
 
-from stitching.bounds import Amount, Few, NotNegative
+from stitching.bounds import Amount, NotNegative
 from stitching.methods.planning import PlanningSettings
 from stitching.methods.protocol import Method, Models, Proposal
 from stitching.models.agent import Agent
@@ -25,7 +25,6 @@ class MBStitchSettings(PlanningSettings):
     """Tables 1 to 3, 7 and 9: the prices of Eq. 2, and how far a plan is followed."""
 
     limit: Amount = 5  # most stitching steps between two skills
-    execute: Few = 1  # actions of each plan carried out before planning again
     alpha: NotNegative = 1.0  # α of Eq. 2, price of the value ensemble's disagreement
     beta: NotNegative = 1.0  # β of Eq. 2, price of the dynamics ensemble's disagreement
     norm: Norm = "mean"  # how Eq. 2's second variance becomes a number

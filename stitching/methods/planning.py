@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from stitching.bounds import Few
 from stitching.envs.protocol import Benchmark
 from stitching.methods.protocol import MethodSettings
 from stitching.models.iql import IQLConfig
@@ -15,8 +16,15 @@ from stitching.registry import field_name
 class PlanningSettings(PlannerChoice, MethodSettings):
     """A planner and its settings; each method declares its own defaults."""
 
+    execute: Few = 1  # actions of each plan carried out before planning again
+
     def check(self, benchmark: Benchmark, agent: IQLConfig) -> None:
-        """Refuse a planner that cannot search the benchmark's actions."""
+        """Refuse a planner that cannot search the benchmark's actions, or plans too few."""
+        if self.execute > self.chosen.horizon:
+            raise ValueError(
+                f"execute: a plan of {self.planner} has {self.chosen.horizon} actions, so "
+                f"{self.execute} cannot be carried out"
+            )
         if self.chosen.can_search(benchmark.actions):
             return
         kind = "discrete" if benchmark.actions.discrete else "continuous"

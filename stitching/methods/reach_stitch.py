@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 import torch
 
-from stitching.bounds import Amount, Few, NotNegative
+from stitching.bounds import Amount, NotNegative
 from stitching.methods.planning import PlanningSettings
 from stitching.methods.protocol import Method, Models, Proposal
 from stitching.models.dynamics import Dynamics
@@ -25,11 +25,10 @@ class ReachStitchSettings(PlanningSettings):
     """How a plan towards the next skill's initiation set is searched and priced."""
 
     limit: Amount = 20  # most stitching steps before a skill
-    execute: Few = 1  # actions of each plan carried out before planning again
     beta: NotNegative = 0.5  # β of Eq. 2, beside a distance in standard deviations
     norm: Norm = "mean"  # as MB-Stitch's
     steered: bool = True  # search around the actions that a linear model of the robot has
-    cem: CEM = CEM(horizon=2, iterations=10, momentum=0.5, tolerance=0.05, initial_std=0.1)
+    cem: CEM = CEM(horizon=2, iterations=10, momentum=0.5, tolerance=0.05)
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,8 @@ import torch
 
 from stitching.data.corrections import STEPS_BACK
 
+FAINTEST = 0.02  # of the strongest effect of actions on a pose: what is weaker is left alone
+
 
 @dataclass(frozen=True)
 class Steering:
@@ -19,17 +21,19 @@ class Steering:
     effect: torch.Tensor  # (robot, action) B
     offset: torch.Tensor  # (robot,) c
     pose: list[int]  # which of x make the pose
-    back: torch.Tensor  # (action, pose) B⁺ of the pose
+    back: torch.Tensor  # (action, pose) B⁺ of the pose, without what is as good as noise
 
     @classmethod
     def of(cls, arrays: dict[str, np.ndarray]) -> Steering:
-        """From the artifact: columns, "robot.columns", "robot.drift", "robot.effect", ….offset."""
+        """From the artifact: columns, scale, "robot.columns", ….drift, ….effect and ….offset."""
         robot = arrays["robot.columns"].tolist()
         pose = [robot.index(column) for column in arrays["columns"].tolist()]
         drift, effect, offset = (
             torch.from_numpy(arrays[f"robot.{name}"]) for name in ("drift", "effect", "offset")
         )
-        return cls(robot, drift, effect, offset, pose, torch.linalg.pinv(effect[pose]))
+        scale = torch.from_numpy(arrays["scale"])
+        back = torch.linalg.pinv(effect[pose] / scale[:, None], rtol=FAINTEST) / scale
+        return cls(robot, drift, effect, offset, pose, back)
 
     def towards(self, states: torch.Tensor, poses: torch.Tensor, horizon: int) -> torch.Tensor:
         """Actions that bring robots nearer to poses, as far as the model knows.

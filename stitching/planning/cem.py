@@ -28,8 +28,8 @@ SMALLEST = 1e-3  # where all elites but the best have less of the weight togethe
 class CEM(Bounded):
     """Fits a Gaussian over action sequences to its own best samples until it has converged.
 
-    Each problem starts from N(0, 1), or around a plan that it is given, and repeats, at iteration
-    t = 0, 1, ...:
+    Each problem starts from N(0, 1), or from N(plan, start_std²) where it is given a plan, and
+    repeats, at iteration t = 0, 1, ...:
 
         a_i ~ clip(N(μ, σ²), −1, 1)                  for i in the population
         E   = the `elites` samples of highest score
@@ -59,7 +59,7 @@ class CEM(Bounded):
     temperature: Positive = 0.5  # τ_0, in units of the score
     temperature_discount: ShareAboveZero = 0.99  # τ_{t+1} / τ_t
     tolerance: NotNegative = 0.05  # largest σ when converged, in units of the action; 0: never
-    initial_std: Positive = 1.0  # σ of the first samples, in units of the action
+    start_std: Positive = 0.1  # σ of the first samples around a plan that it is given
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -88,7 +88,7 @@ class CEM(Bounded):
             problems = torch.arange(len(streams))
             shape = len(streams), self.horizon, actions.size
             mean = torch.zeros(shape) if start is None else start.clone()
-            std = torch.full(shape, self.initial_std)
+            std = torch.full(shape, 1.0 if start is None else self.start_std)
             iterations = torch.zeros_like(problems)
 
             still_open = problems

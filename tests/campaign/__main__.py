@@ -31,12 +31,15 @@ def main(only: str = "", say: bool = False) -> None:
         only: faults whose names contain this.
         say: print every trial.
     """
+    chosen = [fault for fault in FAULTS if only in fault.name]
+    if not chosen:
+        sys.exit(f"no fault is called {only!r}: " + "; ".join(fault.name for fault in FAULTS))
     use_one_thread()
     began = time.monotonic()
     with TemporaryDirectory(prefix="campaign-") as folder:
         ground = Ground(Path(folder))
         print(f"{'fault':<60} tried survived seconds")
-        counts = [attempt(ground, fault, say) for fault in FAULTS if only in fault.name]
+        counts = [attempt(ground, fault, say) for fault in chosen]
     tried, survived = (sum(column) for column in zip(*counts, strict=True))
     minutes = (time.monotonic() - began) / 60
     print(f"{survived:,} of {tried:,} faults survived, in {minutes:.1f} minutes")

@@ -227,7 +227,7 @@ def test_a_grid_is_tabled_like_any_other_run(trained: Path) -> None:
     written = {path.name for path in folder.iterdir()}
     assert written == {
         "scores.csv", "gains.csv", "table.md", "table.tex", "provenance.json", "figures",
-        "spec.json", "segments.parquet", "quarantine.json",
+        "spec.json", "segments.parquet", "quarantine.json", "seeds.csv",
     }  # fmt: skip
     heat_maps = {path.name for path in (folder / "figures").glob("*.svg")}
     assert {"sweep-alpha-beta.svg", "sweep-alpha-beta-tasks.svg"} <= heat_maps

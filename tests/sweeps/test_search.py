@@ -98,7 +98,7 @@ def test_candidates_that_share_models_are_one_spec() -> None:
     assert second.spec.agent.updates == 30
 
 
-@pytest.mark.parametrize("value", [1e-05, 0.1, 1234567.0, 3.141592653589793, 1e20])
+@pytest.mark.parametrize("value", [1e-05, 0.1, 123456.75, 3.141592653589793, 1e6])
 def test_a_method_names_its_numbers_in_full(value: float) -> None:
     method = method_of({ALPHA: value})
     config: Any = load_spec("table1").method_settings(method)

@@ -42,13 +42,15 @@ def full_disk(ground: Ground, trial: int) -> str:
 @contextmanager
 def _small_disk(folder: Path, size: int) -> Iterator[Path]:
     folder.mkdir()
+    if shutil.which("mount") is None:
+        raise NotTriedError("there is no mount to make a small disk with")
     command = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)]
     if os.getuid() != 0 or subprocess.run(command, capture_output=True).returncode != 0:
         raise NotTriedError("only root can mount a small disk")
     try:
         yield folder
     finally:
-        subprocess.run(["umount", "--lazy", str(folder)], check=True)
+        subprocess.run(["umount", "-l", str(folder)], check=True)
 
 
 def little_memory(ground: Ground, trial: int) -> str:
@@ -78,11 +80,12 @@ def one_store(ground: Ground, trial: int) -> str:
     rng = randomness("one store", trial)
     first, root = ground.fresh(), ground.fresh().root
     second = _Beside(root, first.store_root)
-    moment = rng.uniform(0, ground.seconds)
+    moment = rng.uniform(0, 0.8 * ground.seconds)
     runs = [in_a_process(run_serially, place) for place in (first, second)]
     killed, began, collected = int(rng.integers(2)), time.monotonic(), 0
     while any(process.exitcode is None for process in runs):
         collected += _collect(first, second)
+        time.sleep(0.02)
         if time.monotonic() - began > moment and runs[killed].exitcode is None:
             runs[killed].kill()
             runs[killed].join()

@@ -2,9 +2,10 @@
 
 import os
 import signal
+import subprocess
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 
 import numpy as np
@@ -26,6 +27,7 @@ from tests.orchestrator.tiny import Place, blocks_played
 
 KILLS_IN_A_ROW = 3
 SECONDS_STOPPED = 4
+ENDED_BY_RAY = 1  # which ends the driver, too, when its raylet is gone for good
 VICTIMS: dict[str, Callable[[int], list[int]]] = {
     "the driver": lambda driver: [driver],
     "a worker": workers,
@@ -51,20 +53,23 @@ def of_a_ray_run(how: signal.Signals, victim: str, ground: Ground, trial: int) -
     """Once, at a point of the training or of the evaluation."""
     rng = randomness(f"{how.name} {victim}", trial)
     place = ground.fresh()
-    with _launched(place) as driver:
+    with _launched(place) as (driver, processes):
         progress, aim = _point(place, rng)
         while driver.poll() is None and (progress() < aim or not VICTIMS[victim](driver.pid)):
             time.sleep(0.01)
         time.sleep(rng.uniform(0, 0.2))
+        processes += descendants(driver.pid)
         unlucky = rng.permutation(VICTIMS[victim](driver.pid))
         reached = f"{artifacts_built(place)} artifacts, {blocks_played(place.out)} blocks"
         if len(unlucky):  # else it has come to its end meanwhile
-            os.kill(int(unlucky[0]), how)
+            _signal(int(unlucky[0]), how)
         if how == signal.SIGSTOP and len(unlucky):
             time.sleep(SECONDS_STOPPED)
-            os.kill(int(unlucky[0]), signal.SIGCONT)
+            _signal(int(unlucky[0]), signal.SIGCONT)
         code = driver.wait(180)
-    assert code in _expected(how, victim), (code, errors_of(place).read_text())
+    said = errors_of(place).read_text()
+    assert code in _expected(how, victim), (code, said)
+    assert "Traceback" not in said
     if code == 0:
         ground.check(place)
     ground.resume(place)
@@ -84,23 +89,26 @@ def _expected(how: signal.Signals, victim: str) -> set[int]:
         return {0}  # whoever was stopped goes on; what a worker held is sent again
     if victim == "the driver":
         return {0, TERMINATED if how == signal.SIGTERM else -how}
-    return {0, IncompleteError.exit_code}
+    return {0, IncompleteError.exit_code, ENDED_BY_RAY}
+
+
+def _signal(process: int, how: signal.Signals) -> None:
+    with suppress(ProcessLookupError):  # it has just ended
+        os.kill(process, how)
 
 
 @contextmanager
-def _launched(place: Place) -> Iterator:
-    """A run on Ray; whatever of Ray outlives it is ended afterwards."""
-    driver = launch(place)
-    seen: set[int] = set()
+def _launched(place: Place) -> Iterator[tuple[subprocess.Popen[bytes], list[int]]]:
+    """A run on Ray, and a list to be filled with its processes: some of Ray's outlive it."""
+    driver, processes = launch(place), list[int]()
     try:
-        yield driver
+        yield driver, processes
     finally:
-        seen |= set(descendants(driver.pid))
         driver.kill()
         driver.wait()
-        for process in seen:
+        for process in processes:
             if "ray" in title(process):
-                os.kill(process, signal.SIGKILL)
+                _signal(process, signal.SIGKILL)
 
 
 FAULTS = (

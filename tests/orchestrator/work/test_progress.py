@@ -84,7 +84,7 @@ def test_lines_tell_the_share_and_the_time_left() -> None:
         with told.watching(lambda: UnderWay(share=(time.monotonic() - began) / 100)):
             time.sleep(0.3)
     last = lines_of(console)[-1]
-    assert (left := re.fullmatch(r"training: 1/3 \(0%\) after 0 s, about (\d+) s left", last))
+    assert (left := re.fullmatch(r"training: 1/3 \(\d%\) after \d+ s, about (\d+) s left", last))
     assert 90 <= int(left[1]) <= 110
 
 

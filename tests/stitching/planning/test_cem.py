@@ -156,7 +156,7 @@ def test_at_zero_temperature_the_best_elite_decides() -> None:
 
 
 def test_at_high_temperature_elites_count_equally() -> None:
-    planner = replace(PLANNER, temperature=1e9, momentum=0.0, iterations=1)
+    planner = replace(PLANNER, temperature=1e6, momentum=0.0, iterations=1)
     noise = stream(0).standard_normal((50, 3, SIZE), dtype=np.float32)
     samples = torch.from_numpy(noise).clamp(-1, 1)
     elites = samples[bowls(torch.tensor([0]), samples[None])[0].argsort(descending=True)[:10]]
@@ -185,7 +185,7 @@ def test_the_first_samples_lie_around_the_plan_that_it_is_given() -> None:
         return bowls(problems, actions)
 
     start = torch.full((len(TARGETS), 3, SIZE), 0.4)
-    planner = replace(PLANNER, iterations=1, initial_std=0.05)
+    planner = replace(PLANNER, iterations=1, start_std=0.05)
     planner.plan(score, streams(), SPACE, start)
     assert (seen[0].mean(dim=1) - start).abs().max() < 0.03
     assert seen[0].std(dim=1).mean().item() == pytest.approx(0.05, rel=0.1)
@@ -193,5 +193,6 @@ def test_the_first_samples_lie_around_the_plan_that_it_is_given() -> None:
 
 def test_without_a_plan_it_starts_at_zero() -> None:
     by_itself = PLANNER.plan(bowls, streams(), SPACE)
-    at_zero = PLANNER.plan(bowls, streams(), SPACE, torch.zeros(len(TARGETS), 3, SIZE))
+    zero = torch.zeros(len(TARGETS), 3, SIZE)
+    at_zero = replace(PLANNER, start_std=1.0).plan(bowls, streams(), SPACE, zero)
     assert torch.equal(by_itself.actions, at_zero.actions)
