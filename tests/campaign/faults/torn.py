@@ -96,7 +96,7 @@ def _looked_into(ground: Ground, path: Path) -> str:
 
 @cache
 def _killed_at_work(ground: Ground) -> tuple[Place, int]:
-    """A run that SIGKILL has ended while it played, so that its ledger has a log; and its blocks."""
+    """A run that SIGKILL has ended while it played: its ledger has a log. And how many blocks."""
     for _ in range(20):
         place = ground.trained()
         process = in_a_process(run_serially, place)
