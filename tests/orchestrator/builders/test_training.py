@@ -16,6 +16,9 @@ from stitching.data.mixtures import Mixture, skill_pairs
 from stitching.data.transitions import Transitions
 from stitching.envs.kitchen import KITCHEN
 from stitching.envs.maze import MAZE
+from stitching.envs.protocol import Benchmark
+from stitching.envs.robosuite.can import CAN
+from stitching.envs.robosuite.door import DOOR
 from stitching.models.iql import IQLConfig
 from stitching.streams import stream
 
@@ -123,3 +126,36 @@ def test_initiation_sets_know_which_objects_their_skills_are_not_about() -> None
         assert bool(len(sets.states[number])) == shown == np.isfinite(sets.radii[number])
     assert torch.equal(sets.states[5][0], torch.from_numpy(states[1, 0]))
     assert made.info["sizes"] == [len(each) for each in sets.states]
+
+
+@pytest.mark.parametrize("benchmark", [KITCHEN, DOOR, CAN, MAZE], ids=lambda each: each.name)
+def test_initiation_sets_know_how_the_robot_moves(benchmark: Benchmark) -> None:
+    """Where actions are continuous: here each moves one number of what is seen."""
+    rng, n, size = stream("moves"), 400, benchmark.actions.size
+    states = rng.normal(size=(n, benchmark.observation_size))
+    actions = rng.uniform(-1, 1, size=(n, size))
+    discrete = benchmark.actions.discrete
+    following, moved = states.copy(), list(benchmark.factors.pose)[:size]
+    following[:, moved] += 0.3 * actions[:, : len(moved)]
+    data = Transitions(
+        states.astype(np.float32),
+        (np.eye(size)[rng.integers(size, size=n)] if discrete else actions).astype(np.float32),
+        following.astype(np.float32),
+        np.arange(10, n + 1, 10),
+        np.arange(n // 10) % len(benchmark.skills),
+        np.ones(n // 10, dtype=bool),
+    )
+    recipe = {"benchmark": benchmark.name, "factors": to_plain(benchmark.factors)}
+    made = BUILDERS["initiation-sets"].make(recipe, {"demonstrations": as_artifact(data)})
+    sets = load_models(benchmark, {"initiation-sets": made}).trained["initiation-sets"]
+    here = torch.from_numpy(data.observations[:3])
+    plan = sets.towards(here, 0, 2)
+    assert (plan is None) == discrete
+    if plan is not None:
+        assert plan.shape == (3, 2, size)
+        gap = torch.zeros(3, len(benchmark.factors.pose))
+        gap[:, 0] = 0.3
+        there = here[:, list(benchmark.factors.pose)] + gap
+        towards = sets.steering.towards(here, there, 1)[:, 0]
+        assert torch.allclose(towards[:, 0], torch.full((3,), 1 / 3), atol=0.05)
+        assert towards[:, 1:].abs().max() < 0.05
