@@ -84,19 +84,17 @@ def give_ray_a_token() -> None:
         os.environ["RAY_AUTH_TOKEN"] = secrets.token_hex(32)
 
 
-def own_folder(longest: int = 1000) -> Path:
+def own_folder(longest: int | None = None) -> Path:
     """This user's folder in a temporary place, made if it is not there, and closed to others.
 
-    Raises UsageError where there is none with at most so many characters.
+    Raises UsageError where there is none whose name has at most `longest` characters.
     """
     for place in _temporary_places():
         folder = _own_folder_in(place)
-        if len(str(folder)) <= longest and _is_own(folder):
+        if (longest is None or len(str(folder)) <= longest) and _is_own(folder):
             return folder
-    raise UsageError(
-        "no temporary folder can be written to: set TMPDIR to one whose name has at most "
-        f"{LONGEST - len('/skillstitch-1000/ray')} characters"
-    )
+    short = "" if longest is None else f" and whose name has at most {longest} characters"
+    raise UsageError(f"no temporary folder can be written to: set TMPDIR to one that can be{short}")
 
 
 def is_temporary(folder: Path) -> bool:

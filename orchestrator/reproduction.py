@@ -23,7 +23,7 @@ from orchestrator.executors.protocol import Executor
 from orchestrator.spec.spec import Spec
 from orchestrator.spec.structure import Plain
 from orchestrator.storage import locking
-from orchestrator.storage.claim import claim_for_spec
+from orchestrator.storage.claim import claim_for_spec, refuse_sweep
 from orchestrator.storage.datasets import check_own_data, undemonstrated_skills
 from orchestrator.storage.exports import write_readable
 from orchestrator.storage.ledger import Ledger
@@ -101,12 +101,14 @@ class LazyExecutor:
 def reproduce(spec: Spec, settings: Settings, progress: Progress) -> RunDirectory:
     """Carry a spec out, or go on where an earlier run of it ended; returns its directory.
 
-    Raises LockedError, ChangedError, BadDataError, StorageError; IncompleteError when blocks had
-    to be given up (everything else is then finished and reported as partial).
+    Raises LockedError, ChangedError, BadDataError, StorageError; UsageError where the directory
+    holds a sweep; IncompleteError when blocks had to be given up (everything else is then finished
+    and reported as partial).
     """
     directory, watch = RunDirectory(settings.out), Stopwatch()
     check_own_data(make_plan(spec), Store(settings.store))
     with directory.locked(), locking.shared(settings.store, progress.say):
+        refuse_sweep(directory)
         run_id = claim_for_spec(directory, spec)
         directory.uses(settings.store)
         with tracked(directory, settings, progress, watch):

@@ -13,7 +13,7 @@ from orchestrator.reproduction import Settings, partial_error, reproduce, tracke
 from orchestrator.spec.spec import Spec
 from orchestrator.spec.suite import Suite, suite_differences, suite_of
 from orchestrator.storage import locking
-from orchestrator.storage.claim import claim
+from orchestrator.storage.claim import claim, refuse_sweep
 from orchestrator.storage.datasets import check_own_data
 from orchestrator.storage.merge import describe_suite, write_merged
 from orchestrator.storage.rundir import RunDirectory
@@ -41,6 +41,7 @@ def reproduce_suite(suite: Suite, settings: Settings, progress: Progress) -> Run
     for plan in plans:
         check_own_data(plan, Store(settings.store))
     with directory.locked(), locking.shared(settings.store, progress.say):
+        refuse_sweep(directory)
         run_id = claim(
             directory,
             describe_suite(suite),

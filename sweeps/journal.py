@@ -38,8 +38,12 @@ def entries(path: Path) -> Iterator[Plain]:
 
     Raises StorageError for damage elsewhere, and for a file that cannot be read.
     """
-    with storage_errors(path):
-        data = path.read_bytes() if path.is_file() else b""
+    try:
+        data = path.read_bytes()
+    except (FileNotFoundError, NotADirectoryError):
+        return
+    except OSError as error:
+        raise StorageError(f"cannot read {path}: {error.strerror}; name another") from error
     for number, line in enumerate(_whole(data).splitlines(), start=1):
         yield _entry(path, number, line)
 
@@ -52,6 +56,8 @@ def _whole(data: bytes) -> bytes:
 def _entry(path: Path, number: int, line: bytes) -> Plain:
     try:
         entry: Plain = json.loads(line)
+        if not (isinstance(entry, dict) and "op_code" in entry):
+            raise ValueError("it has no op_code")
     except ValueError as error:
         raise StorageError(
             f"{path}, line {number}: damaged ({error}); restore the file, or move it away: the "

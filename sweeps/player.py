@@ -114,7 +114,7 @@ class SpecPlayer:
 
     @contextmanager
     def quietly(self) -> Iterator[None]:
-        """Inside, only what is said gets through: somebody else draws how far the work is."""
+        """Inside, only what is said gets through: the sweep's own bar shows how far it is."""
         loud, self.progress = self.progress, Quiet(self.progress)
         try:
             yield

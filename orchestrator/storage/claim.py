@@ -6,7 +6,7 @@ import uuid
 from collections.abc import Callable, Iterable
 from contextlib import closing
 
-from analysis.schema import SEPARATOR, SPEC
+from analysis.schema import PROVENANCE, QUARANTINE, SEPARATOR, SPEC
 from orchestrator.benchmarks.registry import ENTRIES
 from orchestrator.errors import ChangedError, UsageError
 from orchestrator.spec.methods import first_method, method_label, method_of
@@ -49,7 +49,8 @@ def claim(
     """As `claim_for_spec`, for whatever is described; `differing` compares it with what is there.
 
     Its scores depend on what these plans make and play. What was claimed by a command that then
-    failed, before anything was made or played, is claimed anew.
+    failed, before anything was made or played, is claimed anew. Artifacts that were found in the
+    store are on record, too: they bind the directory as those do that were made.
     """
     now = matters(plans)
     identity = directory.read_json(IDENTITY)
@@ -73,17 +74,26 @@ def claim(
 
 
 def _claim_anew(directory: RunDirectory, description: Plain, now: Plain) -> str:
-    """The identity goes first and comes last: a directory without one is nobody's."""
-    for name in (IDENTITY, TRACKING):
+    """IDENTITY is deleted first and written last: a directory half claimed counts as unclaimed."""
+    for name in (IDENTITY, TRACKING, PROVENANCE, QUARANTINE):
         (directory.path / name).unlink(missing_ok=True)
+    directory.mark(finished=False)
     run_id = uuid.uuid4().hex
     directory.write_json(SPEC, description)
     directory.write_json(IDENTITY, {"run_id": run_id, "matters": now})
     return run_id
 
 
+def refuse_sweep(directory: RunDirectory) -> None:
+    """Raises UsageError where a directory holds a sweep: no run may take its place."""
+    if directory.asked_sweep() is not None:
+        raise UsageError(f"{directory.path} holds a sweep; choose another --out")
+
+
 def is_unused(directory: RunDirectory) -> bool:
-    """Whether a claimed directory has no block and no artifact on record, parts included."""
+    """Whether a claimed directory has no end, block or artifact on record, parts included."""
+    if directory.written:
+        return False
     if directory.is_suite:
         return all(
             is_unused(part) for part in directory.parts.values() if (part.path / SPEC).is_file()

@@ -48,7 +48,9 @@ def _row(folder: Path, sweep_state: Callable[[RunDirectory], str]) -> tuple[str,
         asked = sweep or directory.asked()
         what = f"{asked['name']} at {asked['scale']} scale"
         state = sweep_state(directory) if sweep else _state(directory)
-    except (StorageError, KeyError):
+    except StorageError:
+        what, state = "unreadable", "damaged: `skillstitch status` names the file"
+    except KeyError:
         what, state = "unreadable", "its spec.json is damaged, or of another version"
     newest = max(path.stat().st_mtime for path in folder.iterdir())
     when = datetime.fromtimestamp(newest, UTC).strftime("%Y-%m-%d %H:%M UTC")

@@ -239,10 +239,13 @@ def write_durably(path: Path, data: bytes) -> None:
 
 
 def write_atomically(path: Path, data: bytes) -> None:
-    """Replace a file so that a reader, or a crash, sees the old content or the new, whole."""
+    """Replace a file so that a reader, or a crash, sees the old content or the new, whole.
+
+    Threads and processes may replace the same file at once: the last one wins.
+    """
     with storage_errors(path):
         make_folder(path.parent)
-        temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+        temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
         try:
             write_durably(temporary, data)
             temporary.replace(path)

@@ -27,6 +27,7 @@ def mark_killed(run_dir: Path, uri: str) -> None:
         return  # nothing of this work has been published
     with suppress(Exception):
         write_receipt(run_dir, replace(receipt, published="", status="KILLED"))
+    with suppress(Exception):
         benchmark = read_json(run_dir / SPEC, {})["benchmark"]
         run_id = read_json(run_dir / PROVENANCE, {})["run_id"]
         in_time(lambda: kill_runs(uri, benchmark, run_id))

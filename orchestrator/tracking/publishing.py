@@ -68,6 +68,7 @@ def _publish(
     nothing_grew = growing is None or training == growing.published
     if nothing_grew and read_receipt(run_dir) in settled and not is_gone(uri):
         return PublishOutcome(ok=True, skipped=True)
+    check_time(ending)
     write_receipt(run_dir, replace(wanted, published=""))
     parent, *children = read_views(run_dir, status, training)
     with turn_to_write(uri):

@@ -44,6 +44,6 @@ def catch_up(directory: RunDirectory) -> str:
     try:
         with directory.locked():
             ended: Status = "FAILED" if receipt.status == "FAILED" else "KILLED"
-            return publish(directory, receipt.uri, "FINISHED" if directory.played else ended)
+            return publish(directory, receipt.uri, "FINISHED" if directory.written else ended)
     except LockedError:
         return ""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from analysis.schema import SPEC
 from orchestrator.tracking.stores import TrackingError
-from orchestrator.tracking.views import IDENTITY, RUN_ID, RunView
+from orchestrator.tracking.views import IDENTITY, METHOD, RUN_ID, RunView
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
@@ -50,7 +50,12 @@ class Publisher:
             self._found[tuple(run.data.tags.get(tag, "") for tag in IDENTITY)].append(run)
 
     def write(self, parent: RunView, children: Sequence[RunView]) -> None:
-        """The parent's status comes last: until then a kill leaves it RUNNING, to be resumed."""
+        """The parent's status comes last: until then a kill leaves it RUNNING, to be resumed.
+
+        What no view is of any more is retired once the work is done. Before, a child's learning
+        curves may not be in the directory yet, so it stays and gets the parent's status.
+        """
+        self._check_time()
         above = self._take(parent, {})
         self._fill(above, parent)
         for child in children:
@@ -58,8 +63,12 @@ class Publisher:
             run = self._take(child, {"mlflow.parentRunId": above.info.run_id})
             self._fill(run, child)
             self._settle(run, child.status)
-        for stale in [run for runs in self._found.values() for run in runs]:
-            self._retire(stale)
+        for left in [run for runs in self._found.values() for run in runs]:
+            if parent.status == "FINISHED" or METHOD not in left.data.tags:
+                self._retire(left)
+            else:
+                self._settle(left, parent.status)
+        check_time(self._ending)
         self._settle(above, parent.status)
 
     def _take(self, view: RunView, tags: dict[str, str]) -> Run:

@@ -40,7 +40,7 @@ Look = Callable[[], UnderWay]
 
 
 class Progress(Protocol):
-    """Is told how far the work is; draws it for a person."""
+    """Shows a person how far the work is."""
 
     def phase(self, name: str, total: int, done: int) -> None: ...
 

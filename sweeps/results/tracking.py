@@ -24,7 +24,7 @@ from orchestrator.tracking.receipt import Status
 from orchestrator.tracking.run import NO_TRACKING
 from orchestrator.tracking.stores import connect, open_experiment, turn_to_write
 from orchestrator.tracking.views import RunView
-from orchestrator.tracking.writing import Publisher
+from orchestrator.tracking.writing import Publisher, check_time
 from orchestrator.work.progress import Progress
 
 HIDDEN = ("fields", "trial", "tasks")  # of a trial's numbers
@@ -57,21 +57,22 @@ class Tracker:
 
     def _publish_last(self, status: Status) -> None:
         try:
-            self._publish(status)
+            self.publish(status)
         except Exception as error:
             reason = (str(error).strip() or type(error).__name__).splitlines()[0][:300]
             self._progress.say(f"tracking: {reason}; the next command publishes what was missed")
 
     def _publish_quietly(self, ending: Event) -> None:
         with suppress(Exception):  # the last publication brings what is missed
-            self._publish("RUNNING", ending)
+            self.publish("RUNNING", ending)
 
     @property
     def _benchmark(self) -> str:
         return spec_of(self._directory).benchmark
 
-    def _publish(self, status: Status, ending: Event | None = None) -> None:
-        directory = self._directory
+    def publish(self, status: Status, ending: Event | None = None) -> None:
+        """Bring MLflow up to date; raises what MLflow does, TrackingError once `ending` is set."""
+        directory, ending = self._directory, ending or Event()
         names = (SPEC, "sweep.json", "trials.json", "confirm.json", "winner.json")
         files = {n: directory.path / n for n in names if (directory.path / n).is_file()}
         report = directory.path / "report"
@@ -94,6 +95,7 @@ class Tracker:
         children = [self._child(parent, t) for t in directory.read_json("trials.json") or []]
         with turn_to_write(self._uri):
             client = connect(self._uri)
+            check_time(ending)
             experiment = open_experiment(client, self._uri, experiment_name(self._benchmark))
             files |= pages
             Publisher(client, experiment, files, self._run_id, ending).write(parent, children)

@@ -68,8 +68,11 @@ def test_a_folder_of_somebody_else_is_not_used(
 def test_no_temporary_place(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(libraries, "_temporary_places", lambda: [Path(NOWHERE)])
     monkeypatch.setenv("HOME", NOWHERE)
-    with pytest.raises(UsageError, match="set TMPDIR to one"):
+    with pytest.raises(UsageError, match=r"set TMPDIR to one that can be$"):
         libraries.own_folder()
+    monkeypatch.setenv("TMPDIR", NOWHERE)
+    with pytest.raises(UsageError, match=r"whose name has at most 28 characters$"):
+        libraries.ray_folder()
     libraries.give_places()
     assert "MPLCONFIGDIR" not in os.environ
 

@@ -22,3 +22,18 @@ def test_damage_in_the_middle_is_named(tmp_path: Path) -> None:
     path.write_bytes(b'{"op_code":0}\n\0\0\0\0\n{"op_code":3}\n')
     with pytest.raises(StorageError, match=r"study\.journal, line 2: damaged"):
         list(entries(path))
+
+
+@pytest.mark.parametrize("line", ["[0]", "{}", '"op_code"'])
+def test_a_line_that_is_no_entry_is_named(tmp_path: Path, line: str) -> None:
+    path = tmp_path / JOURNAL
+    path.write_text(f'{{"op_code":0}}\n{line}\n')
+    with pytest.raises(StorageError, match=r"study\.journal, line 2: damaged \(it has no op_code"):
+        list(entries(path))
+
+
+def test_a_journal_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+    path = tmp_path / JOURNAL
+    path.mkdir()
+    with pytest.raises(StorageError, match=f"cannot read {path}: Is a directory"):
+        list(entries(path))

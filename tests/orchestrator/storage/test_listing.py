@@ -26,11 +26,14 @@ def test_every_run_has_a_line(finished: Place, tmp_path: Path) -> None:
     shutil.copytree(finished.out, runs / "whole" / "parts" / "a")
     (runs / "damaged").mkdir()
     (runs / "damaged" / "spec.json").write_text("{")
+    (runs / "old").mkdir()
+    (runs / "old" / "spec.json").write_text("{}")
     shutil.copytree(finished.out, runs / "store" / "agent" / "key")
     (runs / "store" / "blocks.sqlite").touch()
     shutil.copytree(finished.out, runs / "mlartifacts" / "0123" / "artifacts")
-    damaged, stopped, whole = listing_lines(runs, told)
-    assert "unreadable" in damaged
+    damaged, stopped, old, whole = listing_lines(runs, told)
+    assert "damaged: `skillstitch status` names the file" in damaged
+    assert "its spec.json is damaged, or of another version" in old
     assert stopped.startswith(str(runs / "deep" / "stopped"))
     assert "tiny at paper scale" in stopped
     assert " blocks played" in stopped

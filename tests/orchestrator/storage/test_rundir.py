@@ -16,11 +16,14 @@ import pytest
 
 from orchestrator.errors import ChangedError, LockedError, StorageError, UsageError
 from orchestrator.spec.spec import Spec
+from orchestrator.spec.suite import load_asked
 from orchestrator.storage.claim import claim_for_spec, describe, spec_of
 from orchestrator.storage.rundir import RunDirectory, default_out
+from orchestrator.suite_reproduction import reproduce_asked
+from orchestrator.work.progress import Silent
 from stitching.methods.mb_stitch import MBStitchSettings
 from stitching.rollout import RolloutConfig
-from tests.orchestrator.tiny import Place
+from tests.orchestrator.tiny import TINY, Place, serially
 from tests.sections import section, with_sections
 
 
@@ -183,13 +186,41 @@ def test_a_directory_in_which_nothing_was_made_is_claimed_anew(
     """As after an address that was wrong."""
     before = claim_for_spec(directory, spec)
     directory.ledger().close()
-    directory.write_json("tracking.json", {"of": before})
+    traces = ("tracking.json", "provenance.json", "quarantine.json")
+    for name in traces:
+        directory.write_json(name, {"of": before})
     other = replace(spec, episodes=7)
     assert claim_for_spec(directory, other) != before
     assert spec_of(directory) == other
-    assert not (directory.path / "tracking.json").exists()
+    assert not any((directory.path / name).exists() for name in traces)
 
     with closing(directory.ledger()) as ledger:
         ledger.record_artifact("key", "digest")
     with pytest.raises(ChangedError, match="episodes: 7 → 6"):
         claim_for_spec(directory, spec)
+
+
+def test_a_finished_directory_without_a_ledger_is_not_claimed_anew(
+    directory: RunDirectory, spec: Spec
+) -> None:
+    claim_for_spec(directory, spec)
+    directory.mark(finished=True)
+    with pytest.raises(ChangedError, match="episodes: 6 → 7"):
+        claim_for_spec(directory, replace(spec, episodes=7))
+    assert directory.written
+
+
+def test_what_is_claimed_anew_is_not_finished(directory: RunDirectory, spec: Spec) -> None:
+    claim_for_spec(directory, spec)
+    directory.mark(finished=True)
+    (directory.path / "identity.json").unlink()
+    claim_for_spec(directory, spec)
+    assert not directory.written
+
+
+@pytest.mark.parametrize("asked", [TINY, TINY.with_name("suite.toml")], ids=["spec", "suite"])
+def test_a_run_does_not_take_a_sweep_s_directory(place: Place, asked: Path) -> None:
+    place.directory.write_json("sweep.json", {"name": "search"})
+    with pytest.raises(UsageError, match=rf"{place.out} holds a sweep; choose another --out"):
+        reproduce_asked(load_asked(str(asked)), serially(place.out, place.store_root), Silent())
+    assert not (place.out / "identity.json").exists()

@@ -11,7 +11,9 @@ import resource
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -319,6 +321,14 @@ def test_files_are_replaced_whole_or_not_at_all(tmp_path: Path) -> None:
     write_atomically(file, b"new" * 100)
     assert file.read_bytes() == b"new" * 100
     assert list(file.parent.iterdir()) == [file]
+
+
+def test_threads_may_replace_the_same_file_at_once(tmp_path: Path) -> None:
+    file, contents = tmp_path / "tracking.json", [bytes([n]) * 100_000 for n in range(64)]
+    with ThreadPoolExecutor(8) as threads:
+        list(threads.map(partial(write_atomically, file), contents))
+    assert file.read_bytes() in contents
+    assert list(tmp_path.iterdir()) == [file]
 
 
 def test_errors_of_other_kinds_are_not_blamed_on_the_disk(tmp_path: Path) -> None:

@@ -2,12 +2,14 @@
 
 import time
 from pathlib import Path
+from threading import Event
 
 import pytest
 
+from orchestrator.errors import StorageError
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.tracking import Live, killing, live, mark_killed, publish
-from orchestrator.tracking.receipt import read_receipt
+from orchestrator.tracking.receipt import Receipt, read_receipt
 from orchestrator.tracking.run import catch_up
 from tests.orchestrator.tracking.fake_run import Seen, start_run, train_run
 
@@ -58,6 +60,60 @@ def test_a_store_that_does_not_answer_keeps_nobody_waiting(
 def test_a_run_whose_process_is_gone_is_killed_by_the_next_command(running: Path, uri: str) -> None:
     assert catch_up(RunDirectory(running)) == ""
     assert Seen(uri).states() == ("KILLED", {"KILLED"})
+
+
+def test_a_run_that_gave_up_blocks_stays_finished(run_dir: Path, uri: str) -> None:
+    directory = RunDirectory(run_dir)
+    directory.write_json("quarantine.json", [{"seed": 0}])
+    directory.mark(finished=True)
+    assert publish(run_dir, uri, "FINISHED").ok
+    (run_dir / "report" / "index.md").write_text("written again")
+    assert catch_up(directory) == ""
+    assert Seen(uri).states() == ("FINISHED", {"FINISHED"})
+
+
+def test_a_directory_that_cannot_be_written_to_does_not_keep_mlflow_from_knowing(
+    running: Path, uri: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(run_dir: Path, receipt: Receipt) -> None:
+        raise StorageError(f"cannot write {run_dir}")
+
+    monkeypatch.setattr(killing, "write_receipt", refused)
+    mark_killed(running, uri)
+    assert Seen(uri).states() == ("KILLED", {"KILLED"})
+
+
+def test_what_comes_after_the_end_changes_nothing(running: Path, uri: str) -> None:
+    mark_killed(running, uri)
+    before = read_receipt(running)
+    ending = Event()
+    ending.set()
+    assert "the work ended" in publish(running, uri, "RUNNING", ending).error
+    assert read_receipt(running) == before
+    assert Seen(uri).states() == ("KILLED", {"KILLED"})
+
+
+@pytest.mark.parametrize(("step", "parents"), [("search_runs", []), ("set_tag", ["RUNNING"])])
+def test_a_publication_breaks_off_before_it_begins_and_before_it_settles(
+    tmp_path: Path, uri: str, step: str, parents: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from mlflow import MlflowClient
+
+    real, ending = getattr(MlflowClient, step), Event()
+
+    def ends_meanwhile(self: MlflowClient, *args: object, **kwargs: object) -> object:
+        ending.set()
+        return real(self, *args, **kwargs)
+
+    monkeypatch.setattr(MlflowClient, step, ends_meanwhile)
+    outcome = publish(start_run(tmp_path / "run"), uri, "FINISHED", ending)
+    monkeypatch.undo()
+    assert "the work ended" in outcome.error
+    client = MlflowClient(tracking_uri=uri)
+    experiment = client.get_experiment_by_name("skillstitch/maze")
+    assert experiment is not None
+    runs = client.search_runs([experiment.experiment_id])
+    assert [run.info.status for run in runs] == parents
 
 
 def test_a_publication_under_way_breaks_off_when_the_work_does(

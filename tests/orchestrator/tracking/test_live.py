@@ -17,9 +17,17 @@ from orchestrator.spec.spec import Spec
 from orchestrator.tracking import default_uri, live, publish
 from orchestrator.tracking.live import Growing, Live
 from orchestrator.tracking.metrics import learning_curves
+from orchestrator.tracking.receipt import Status
 from orchestrator.work import checkpoints
 from tests.orchestrator.tiny import Lines, Place, carry_out, serially
-from tests.orchestrator.tracking.fake_run import SEEDS, Seen, finish_run, start_run, train_run
+from tests.orchestrator.tracking.fake_run import (
+    CHILDREN,
+    SEEDS,
+    Seen,
+    finish_run,
+    start_run,
+    train_run,
+)
 
 
 def metric_rows(database: Path) -> list[tuple[str, str, int, float, int]]:
@@ -71,6 +79,25 @@ def test_curves_grow_and_end_as_if_they_had_come_whole(
     shutil.copy(fresh_store, at_once)
     assert publish(run_dir, default_uri(at_once.parent), "FINISHED").ok
     assert metric_rows(at_once) == grown
+
+
+@pytest.mark.parametrize("status", ["FAILED", "KILLED"])
+def test_work_that_breaks_off_keeps_its_curves(tmp_path: Path, uri: str, status: Status) -> None:
+    """Before training.json is there, and while the same command goes on."""
+    run_dir = start_run(tmp_path / "run")
+    other = train_run(start_run(tmp_path / "other")) / "training.json"
+    training = json.loads(other.read_text())
+    growing = Growing(lambda: training)
+    assert publish(run_dir, uri, "RUNNING", growing=growing).ok
+    curves = metric_rows(Path(uri.removeprefix("sqlite:///")))
+    assert curves
+    steps: list[tuple[Status, Growing | None]] = [(status, None), ("RUNNING", Growing(list))]
+    for now, growing_now in (*steps, *steps):
+        assert publish(run_dir, uri, now, growing=growing_now).ok
+        seen = Seen(uri)
+        assert seen.states() == (now, {now})
+        assert len(seen.children) == CHILDREN
+        assert metric_rows(Path(uri.removeprefix("sqlite:///"))) == curves
 
 
 @pytest.mark.slow
