@@ -181,7 +181,7 @@ def test_another_study_is_refused_and_a_larger_budget_is_not(
 
 def test_what_is_refused_changes_no_file(done: Path) -> None:
     """By the journal, too: a finished sweep stays finished."""
-    other = tiny_sweep(enqueued=({path: 3 for path in SWEEP.space},))
+    other = tiny_sweep(enqueued=(dict.fromkeys(SWEEP.space, 3),))
     refused = {"damaged": (SWEEP, StorageError), "enqueued": (other, ChangedError)}
     journal = done / "sweep" / JOURNAL
     whole = journal.read_bytes()
