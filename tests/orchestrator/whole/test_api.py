@@ -41,8 +41,9 @@ def test_a_library_to_draw_with_is_not_needed(
     """As of a command; pictures are drawn by processes that get what the user has chosen."""
     monkeypatch.setenv(CHOSEN, "egl")
     monkeypatch.setenv("MUJOCO_GL", "osmesa")
-    places = {"out": done.out, "store": done.store_root}
-    orchestrator.reproduce(spec, **places, executor="serial", tracking_uri="none")
+    orchestrator.reproduce(
+        spec, done.out, store=done.store_root, executor="serial", tracking_uri="none"
+    )
     assert os.environ["MUJOCO_GL"] == "disable"
 
 
