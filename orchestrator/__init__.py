@@ -70,7 +70,7 @@ def reproduce(
     """
     from pathlib import Path
 
-    from orchestrator.libraries import give_places
+    from orchestrator.libraries import give_places, set_drawing_aside
     from orchestrator.reproduction import Settings
     from orchestrator.storage.rundir import default_out
     from orchestrator.storage.store import USUAL_STORE
@@ -78,6 +78,7 @@ def reproduce(
     from orchestrator.work.progress import Silent
 
     give_places()
+    set_drawing_aside()
     settings = Settings(
         Path(out) if out is not None else default_out(spec),
         Path(store) if store is not None else USUAL_STORE,

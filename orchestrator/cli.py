@@ -175,7 +175,7 @@ COMMANDS: dict[str, tuple[Command, str]] = {
     "plan": (_plan, "what a spec would train and simulate, and what that costs"),
     "run": (_run, "carry a spec out, or resume it; ends with tables and report"),
     "sweep": (_sweep, "search over a spec's fields, or resume it; ends with its winner"),
-    "status": (run_commands.status, "how far a run directory is"),
+    "status": (run_commands.status, "how far a run or a sweep is, and what to do next"),
     "list": (run_commands.list_runs, "every run and sweep in a folder, and how far each is"),
     "report": (run_commands.report, "write a run's or sweep's report again, and export its tables"),
     "enjoy": (run_commands.enjoy, "an episode of a run, played again, as a film"),

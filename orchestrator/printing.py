@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 from analysis.studies.data import undemonstrated_note
@@ -109,22 +108,24 @@ def _disk_line(costs: list[CostEstimate]) -> str:
 
 
 def suite_plan_lines(suite: Suite, store_root: Path, workers: int | None) -> Iterator[str]:
-    """Each part's plan and cost, then those of all; what parts share counts once."""
+    """Each part's plan and cost, then those of all; what parts share counts once.
+
+    Raises BadDataError before the first line where people's own data cannot be used.
+    """
     store, shared = Store(store_root), Ledger.look(store_root / "blocks.sqlite")
+    plans = [make_plan(part.spec) for part in suite.parts]
+    left_out = [list(data_lines(plan, store)) for plan in plans]
     counted: set[str] = set()
     costs = []
     yield f"{suite.name} at {suite.scale} scale: {suite.title}"
-    for part in suite.parts:
-        plan = make_plan(part.spec)
-        left_out = list(data_lines(plan, store))
-        new = {key: recipe for key, recipe in plan.recipes.items() if key not in counted}
-        again = len(plan.recipes) - len(new)
-        counted |= set(new)
-        costs.append(estimate(replace(plan, recipes=new), store, shared))
+    for part, plan, notes in zip(suite.parts, plans, left_out, strict=True):
+        again = len(counted & set(plan.recipes))
+        costs.append(estimate(plan, store, shared, counted))
+        counted |= set(plan.recipes)
         yield ""
         yield f"part {part.label}" + (f", with {again} artifacts of parts above" if again else "")
         yield from plan_lines(part.spec, costs[-1], workers)
-        yield from left_out
+        yield from notes
     yield ""
     yield (
         f"all {len(costs)} parts: {sum(each.episodes for each in costs):,} episodes, "

@@ -69,7 +69,7 @@ def report(words: list[str], output: Console, errors: Console) -> None:
 
         Args:
             run: the directory of the run or sweep.
-            results: also export each table to RESULTS/<table>/.
+            results: also export: each table to RESULTS/<table>/; of other sweeps RESULTS/<name>/.
             force: let the exported tables replace larger ones.
         """
         directory = RunDirectory(run)

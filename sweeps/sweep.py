@@ -11,13 +11,16 @@ from pathlib import Path
 from analysis.schema import PROVENANCE
 from orchestrator.errors import ChangedError, UsageError
 from orchestrator.reproduction import LazyExecutor, Settings
+from orchestrator.spec.spec import differences
 from orchestrator.spec.structure import Plain, structure, to_plain
 from orchestrator.storage import locking
-from orchestrator.storage.claim import claim_for_spec, is_unused, spec_of
+from orchestrator.storage.claim import claim, is_unused, spec_of
+from orchestrator.storage.claim import describe as describe_spec
+from orchestrator.storage.datasets import check_own_data
 from orchestrator.storage.provenance import provenance
 from orchestrator.storage.rundir import PLANNED, SWEEP, RunDirectory
-from orchestrator.storage.store import storage_errors
-from orchestrator.work.plan import make_plan
+from orchestrator.storage.store import Store, storage_errors
+from orchestrator.work.plan import Plan, make_plan
 from orchestrator.work.progress import Progress
 from sweeps.confirm import confirm
 from sweeps.journal import JOURNAL
@@ -65,15 +68,21 @@ def carry_out(
     `results`, `force`: see `write_report`. source: by default its name. Raises what a reproduction
     raises; IncompleteError loses nothing.
     """
+    spec = search_spec(sweep)
+    plan = make_plan(spec)
+    check_own_data(plan, Store(settings.store))
     directory = RunDirectory(settings.out)
     with directory.locked(), locking.shared(settings.store, progress.say):
-        run_id = claim_for_spec(directory, search_spec(sweep))
-        settle(directory, sweep)
+        run_id = claim(
+            directory, describe_spec(spec), [plan], lambda: differences(spec_of(directory), spec)
+        )
+        check_same(directory, sweep)
+        study = SweepStudy(sweep, directory.path)  # which may refuse what has been changed, too
+        directory.write_json(SWEEP, _asked(sweep))
         directory.mark(finished=False)
         directory.write_json(SOURCE, source or sweep.name)
-        directory.write_json(PLANNED, _shared_artifacts(sweep))
+        directory.write_json(PLANNED, _shared_artifacts(plan, sweep))
         directory.uses(settings.store)
-        study = SweepStudy(sweep, directory.path)
         if study.cut:
             progress.say(f"{study.path}: cut {study.cut} bytes of a line torn by a kill")
         ledger = directory.ledger()
@@ -87,7 +96,7 @@ def carry_out(
             storage_errors(directory.path),
         ):
             if sweep.question.shared:  # else every trial has its own models, as it comes
-                player.prepare([search_spec(sweep)])
+                player.prepare([spec])
             with player.quietly():
                 for _ in run_search(sweep, study, player, progress):
                     _write_results(directory, study, player.executor, earlier)
@@ -120,28 +129,35 @@ def report_again(directory: RunDirectory, results: Path | None, *, force: bool =
         write_report(sweep, study, directory, results, force=force)
 
 
-def settle(directory: RunDirectory, sweep: SweepSpec) -> None:
-    """Claim the directory for a sweep, or check that its study is of the same one."""
-    asked = json.loads(json.dumps(to_plain(sweep))) | {"trials": sweep.budget}
-    before = directory.asked_sweep() or asked
+def check_same(directory: RunDirectory, sweep: SweepSpec) -> None:
+    """Raise ChangedError where the directory's study is of another sweep.
+
+    One of which nothing was played is removed instead.
+    """
+    asked, before = _asked(sweep), directory.asked_sweep()
     changed = [
         f"{name}: {before.get(name)!r} → {value!r}"
         for name, value in asked.items()
-        if name not in MAY_CHANGE and before.get(name) != value
+        if before is not None and name not in MAY_CHANGE and before.get(name) != value
     ]
-    if changed and is_unused(directory):
+    begun = before is None  # at most: a kill may have come before sweep.json was written
+    if (changed or begun) and is_unused(directory):
         (directory.path / JOURNAL).unlink(missing_ok=True)
     elif changed:
         raise ChangedError(
             f"{directory.path} holds another study; choose another --out (finished blocks are "
             "shared), or go back to:\n  " + "\n  ".join(changed)
         )
-    directory.write_json(SWEEP, asked)
 
 
-def _shared_artifacts(sweep: SweepSpec) -> Plain:
+def _asked(sweep: SweepSpec) -> Plain:
+    """As sweep.json has it."""
+    plain: Plain = json.loads(json.dumps(to_plain(sweep)))
+    return plain | {"trials": sweep.budget}
+
+
+def _shared_artifacts(plan: Plan, sweep: SweepSpec) -> Plain:
     """What `skillstitch status` counts: nothing where every trial has models of its own."""
-    plan = make_plan(search_spec(sweep))
     shared = plan.needed if sweep.question.shared else ()
     return {"artifacts": [[plan.recipes[key].kind, key] for key in sorted(shared)]}
 

@@ -33,7 +33,8 @@ def draw_figures(
         for table in tables:
             name = f"{table.entry.id}-scores"
             save(draw_scores(table.scores, table.labels, table.seed_scores), folder, name)
-            each = " Small dots: the mean of each seed." if len(run.spec.seeds) > 1 else ""
+            dotted = len(table.seed_scores["seed"].unique()) > 1  # of those that were played
+            each = " Small dots: the mean of each seed." if dotted else ""
             caption = (
                 f"{table.entry.title}: our scores (filled, with 95 % intervals) and the paper's "
                 f"(hollow).{each} Scale {run.spec.scale}, {len(run.spec.seeds)} seed(s). "
@@ -75,8 +76,8 @@ FORECAST_CAPTION = (
     "dashed line both are equal."
 )
 DISTRIBUTION_CAPTION = (
-    "Performance profiles (Agarwal et al., 2021): the share of tasks whose score is above τ, over "
-    "all tasks of a row and all seeds. A line above another at every τ is better."
+    "Performance profiles (Agarwal et al., 2021): the share of runs, a task under one seed's "
+    "models each, whose score is above τ. A line above another at every τ is better."
 )
 BANDS = " Bands are 95 % intervals from resampling seeds."
 PREDICTIONS_CAPTION = (

@@ -1,4 +1,4 @@
-"""Performance profiles: the share of tasks with a score above each threshold, by method."""
+"""Performance profiles: the share of runs with a score above each threshold, by method."""
 
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -39,5 +39,5 @@ def draw_distributions(table: Table) -> Figure:
     ]
     figure.legend(handles=keys, loc="outside upper left", ncols=min(4, len(keys)))
     figure.supxlabel("score τ", fontsize=9)
-    figure.supylabel("share of tasks with a score above τ", fontsize=9)
+    figure.supylabel("share of runs with a score above τ", fontsize=9)
     return figure

@@ -14,13 +14,13 @@ NOTE = (
     "resampling seeds, each with all of its tasks."
 )
 ONE_SEED = "With one seed there is nothing to resample, and so no interval."
+SOME_OF_ONE_SEED = "Cells of one seed have no interval."
 
 
 def distribution_table(table: Table) -> pd.DataFrame:
     """COLUMNS, one row a cell with many tasks; `mean` is of the same scores, none left out."""
-    means = table.scores.set_index(["row", "method"])["score"]
     records = [
-        (row, method, of.iqm, of.iqm_low, of.iqm_high, means[row, method], of.tasks, of.seeds)
+        (row, method, of.iqm, of.iqm_low, of.iqm_high, of.mean, of.tasks, of.seeds)
         for (row, method), of in table.distributions.items()
     ]
     return pd.DataFrame(records, columns=COLUMNS)
@@ -35,7 +35,8 @@ def distribution_lines(table: Table, found: pd.DataFrame) -> list[list[str]]:
     """A line a row: its tasks, and each method's interquartile mean with its interval."""
     cells = {(cell["row"], cell["method"]): cell for cell in found.to_dict("records")}
     lines = []
-    for row, tasks in found.groupby("row", sort=False)["tasks"].max().items():
+    for row, tasks in found.groupby("row", sort=False)["tasks"]:
+        fewest, most = tasks.min(), tasks.max()
         texts = []
         for method in table.methods:
             cell = cells.get((row, method))
@@ -45,11 +46,15 @@ def distribution_lines(table: Table, found: pd.DataFrame) -> list[list[str]]:
                 texts.append(f"{cell['iqm']:.3f}")
             else:
                 texts.append(f"{cell['iqm']:.3f} [{cell['ci_low']:.3f}, {cell['ci_high']:.3f}]")
-        lines.append([f"{row} ({tasks} tasks)", *texts])
+        count = f"{most}" if fewest == most else f"{fewest} to {most}"
+        lines.append([f"{row} ({count} tasks)", *texts])
     return lines
 
 
 def distribution_note(found: pd.DataFrame) -> str:
     """What the table shows, and what its intervals rest on."""
-    seeds = int(found["seeds"].min())
-    return f"{NOTE} {ONE_SEED if seeds == 1 else seed_note(seeds)}"
+    several = found["seeds"][found["seeds"] > 1]
+    if several.empty:
+        return f"{NOTE} {ONE_SEED}"
+    note = f"{NOTE} {seed_note(int(several.min()))}"
+    return note if len(several) == len(found) else f"{note} {SOME_OF_ONE_SEED}"

@@ -22,6 +22,7 @@ DECIMALS = 9  # equal scores are equal numbers, to the thresholds too
 class Distribution:
     """Of S seeds' scores on T tasks; bounds are NaN with one seed, which resampling cannot move."""
 
+    mean: float
     iqm: float
     iqm_low: float
     iqm_high: float
@@ -57,7 +58,7 @@ def distribution(runs: np.ndarray, rng: np.random.Generator) -> Distribution:
     iqm_low, iqm_high = _bounds(runs, interquartile_mean, rng)
     share_low, share_high = _bounds(runs, share_above, rng)
     return Distribution(
-        float(interquartile_mean(runs)), float(iqm_low), float(iqm_high),
+        float(runs.mean()), float(interquartile_mean(runs)), float(iqm_low), float(iqm_high),
         share_above(runs), share_low, share_high, *runs.shape,
     )  # fmt: skip
 

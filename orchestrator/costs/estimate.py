@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -42,18 +42,24 @@ class CostEstimate:
     seconds_measured: float  # of both together, what rests on measurements in this store
 
 
-def estimate(plan: Plan, store: Store, shared: Ledger) -> CostEstimate:
+def estimate(
+    plan: Plan, store: Store, shared: Ledger, counted: Collection[str] = frozenset()
+) -> CostEstimate:
     """Look at store and ledger; runs nothing.
 
     What work like it has taken in this store, and how many episodes survived it, is expected again;
     where there was none, what is counted from the settings, and as many survivors as usual in that
     benchmark.
+
+    counted: keys of artifacts that are somebody else's to make, and cost nothing here.
     """
     spec = plan.spec
     artifacts: dict[str, Counter[bool]] = {}
     training = measured = model_bytes = 0.0
     taken = _training_seconds(plan.recipes, store)
     for key, recipe in plan.recipes.items():
+        if key in counted:
+            continue
         found = (recipe.kind, key) in store
         artifacts.setdefault(recipe.kind, Counter())[found] += 1
         if not found:

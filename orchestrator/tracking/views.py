@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from analysis.schema import DATASETS, EPISODES, PROVENANCE, SPEC, TRAINING, RunSpec, leaves
-from orchestrator.tracking.changes import changed_fields, short_changes
+from orchestrator.tracking.changes import short_changes
 from orchestrator.tracking.metrics import (
     Curves,
     finite,
@@ -67,7 +67,7 @@ def read_views(
         name=run_name(
             spec.name,
             spec.scale,
-            short_changes(changed_fields(plain["spec"])),
+            short_changes(spec.origin.changed if spec.origin else ()),
             short_id(provenance["run_id"]),
         ),
         status=status,

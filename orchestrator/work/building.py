@@ -71,7 +71,7 @@ class Builds:
         missing = {key: r for key, r in recipes.items() if key in wanted - present}
         self.progress.phase(phase, len(wanted), len(wanted & present))
         available, submitted = set(present), set[str]()
-        trainings = Trainings(self.store, missing, len(self.plan.spec.skill_names))
+        trainings = Trainings(self.store, recipes, set(missing), len(self.plan.spec.skill_names))
         with self.progress.watching(
             lambda: trainings.under_way(available & submitted, submitted - available)
         ):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -29,17 +29,19 @@ class Trainings:
     """
 
     store: Store
-    recipes: Mapping[str, Recipe]  # by key
+    recipes: Mapping[str, Recipe]  # by key, with those of all inputs: see `Likeness`
+    wanted: Collection[str]  # keys of those that are made
     skills: int  # of the benchmark
     _since: float = field(default_factory=time.time)
     _before: dict[str, tuple[float, int]] = field(default_factory=dict)  # when, how many updates
 
     @cached_property
     def _seconds(self) -> dict[str, float]:
-        return training_seconds(self.recipes, self.store)
+        seconds = training_seconds(self.recipes, self.store)
+        return {key: seconds[key] for key in self.wanted}
 
     def under_way(self, finished: Iterable[str], begun: Iterable[str]) -> UnderWay:
-        """Of all recipes: `finished` are there; `begun` are not, but being made."""
+        """Of all that is wanted: `finished` are there; `begun` are not, but being made."""
         done = sum(self._seconds.get(key, 0.0) for key in finished)
         lines = []
         for key in sorted(begun):

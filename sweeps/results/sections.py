@@ -65,7 +65,7 @@ def sections(found: Found, figures: Sequence[Drawn]) -> list[Section]:
         Section("All trials", _every_trial(sweep, found.trials), on_page_only=True),
         Section("Search space", _space(sweep, winner["fields"])),
         Section("How it was searched", _how(sweep)),
-        Section("What it took", _costs(found.counts)),
+        Section("What it took", _costs(found.counts), on_page_only=True),
         Section("Made again by", _again(sweep, found.command, found.files)),
         Section("All settings of the base", _base(sweep), on_page_only=True),
         Section("Provenance", _facts(leaves(found.provenance, ".")), on_page_only=True),

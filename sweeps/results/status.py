@@ -22,7 +22,7 @@ MINIMISED = 1  # a direction, in Optuna's numbers
 
 
 @dataclass(frozen=True)
-class Progress:
+class SearchState:
     """How far a search is."""
 
     asked: Plain  # sweep.json
@@ -47,7 +47,7 @@ class Progress:
         return min(kept, key=lambda trial: (sign * trial[name], trial["trial"]), default=None)
 
 
-def progress_of(directory: RunDirectory) -> Progress:
+def state_of(directory: RunDirectory) -> SearchState:
     """Raises StorageError for a damaged file; the directory must be of a sweep."""
     asked = directory.asked_sweep()
     assert asked is not None
@@ -57,7 +57,7 @@ def progress_of(directory: RunDirectory) -> Progress:
         count[entry["op_code"]] += 1
         if entry["op_code"] == CREATED:
             direction = entry["directions"][0]
-    return Progress(
+    return SearchState(
         asked,
         directory.read_json("trials.json") or [],
         count[ASKED] - count[TOLD],
@@ -75,9 +75,9 @@ def _written(directory: RunDirectory) -> bool:
 
 def state(directory: RunDirectory) -> str:
     """In a few words, for a list of runs."""
-    progress = progress_of(directory)
-    trials = f"{len(progress.trials)} of {progress.asked['trials']} trials"
-    return f"finished, {trials}" if progress.written else f"unfinished, {trials}"
+    search = state_of(directory)
+    trials = f"{len(search.trials)} of {search.asked['trials']} trials"
+    return f"finished, {trials}" if search.written else f"unfinished, {trials}"
 
 
 def sweep_lines(directory: RunDirectory, store_root: Path | None = None) -> Iterator[str]:
@@ -85,23 +85,23 @@ def sweep_lines(directory: RunDirectory, store_root: Path | None = None) -> Iter
 
     Artifacts are looked for in a store, by default its own. Raises StorageError for a damaged file.
     """
-    progress = progress_of(directory)
-    asked = progress.asked
+    search = state_of(directory)
+    asked = search.asked
     yield f"{directory.path}: sweep {asked['name']} at {asked['scale']} scale"
     yield f"  artifacts  {_artifacts(directory, Store(store_root or directory.store_root))}"
     yield from _block_lines(directory)
-    trials = f"{len(progress.trials)} of {asked['trials']} finished"
-    trials += f", {progress.given_up} of them given up early" if progress.given_up else ""
-    trials += f"; {progress.open} more asked and not finished" if progress.open else ""
+    trials = f"{len(search.trials)} of {asked['trials']} finished"
+    trials += f", {search.given_up} of them given up early" if search.given_up else ""
+    trials += f"; {search.open} more asked and not finished" if search.open else ""
     yield f"  trials     {trials}"
-    if progress.best is not None:
-        best = progress.best
-        yield f"  best       trial {best['trial']}: {_number(progress, best)}, {best['setting']}"
-    yield f"  confirmed  {_confirmed(directory, progress)}"
+    if search.best is not None:
+        best = search.best
+        yield f"  best       trial {best['trial']}: {_number(search, best)}, {best['setting']}"
+    yield f"  confirmed  {_confirmed(directory, search)}"
     written = [directory.path / "report" / f"index.{kind}" for kind in ("html", "md")]
     report = next((str(path) for path in written if path.is_file()), "not written yet")
     yield f"  report     {report}"
-    yield f"  next       {_next(directory, progress)}"
+    yield f"  next       {_next(directory, search)}"
 
 
 def _artifacts(directory: RunDirectory, store: Store) -> str:
@@ -126,33 +126,33 @@ def _block_lines(directory: RunDirectory) -> Iterator[str]:
         yield f"  failures   {len(failures)} blocks failed at least once"
 
 
-def _number(progress: Progress, result: Plain) -> str:
+def _number(search: SearchState, result: Plain) -> str:
     """ "gain +0.213 [+0.150, +0.270]": the first objective, with its interval if it has one."""
-    name = progress.asked["objectives"][0]
+    name = search.asked["objectives"][0]
     if f"{name}_low" not in result:
         return f"{name} {result[name]:,.4g}"
     low, high = result[f"{name}_low"], result[f"{name}_high"]
     return f"{name} {result[name]:+.3f} [{low:+.3f}, {high:+.3f}]"
 
 
-def _confirmed(directory: RunDirectory, progress: Progress) -> str:
-    wanted = progress.asked["confirm"]["best"]
+def _confirmed(directory: RunDirectory, search: SearchState) -> str:
+    wanted = search.asked["confirm"]["best"]
     if not wanted:
         return "not asked for; `confirm` in its file would tell how much of the best survives"
     found = directory.read_json("confirm.json") or {}
     rows = {row["trial"]: row for row in found.get("trials", [])}
-    if progress.best is None or progress.best["trial"] not in rows:
+    if search.best is None or search.best["trial"] not in rows:
         return f"not yet; the best {wanted} are played again when all trials are finished"
     where = "held-out tasks" if found["held_out"] else "the search's tasks"
-    again = rows[progress.best["trial"]]
-    return f"{_number(progress, again)} on {len(found['tasks'])} {where}, by new seeds"
+    again = rows[search.best["trial"]]
+    return f"{_number(search, again)} on {len(found['tasks'])} {where}, by new seeds"
 
 
-def _next(directory: RunDirectory, progress: Progress) -> str:
-    if progress.all_played and progress.best is None:
+def _next(directory: RunDirectory, search: SearchState) -> str:
+    if search.all_played and search.best is None:
         return "no trial keeps to the constraints: loosen them, under another --out"
-    if not progress.written:
-        again = command_here(directory, progress.asked)
+    if not search.written:
+        again = command_here(directory, search.asked)
         return f"unless it is at work, the same command goes on: {again}"
-    words = ["skillstitch", "run", progress.asked["base"], "--from-sweep", str(directory.path)]
+    words = ["skillstitch", "run", search.asked["base"], "--from-sweep", str(directory.path)]
     return f"with the winner: {shlex.join(words)}"

@@ -10,16 +10,19 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import optuna
 import pytest
 from optuna.storages.journal import JournalFileBackend
 
-from orchestrator.errors import ChangedError, LockedError, StorageError
+from orchestrator.errors import BadDataError, ChangedError, LockedError, StorageError
+from orchestrator.spec.structure import merged
 from orchestrator.storage.rundir import RunDirectory
 from orchestrator.work import evaluation
 from sweeps.journal import JOURNAL, repair
-from sweeps.spec import Pruner
+from sweeps.spec import Confirm, Pruner
 from sweeps.study import SweepStudy
+from tests.orchestrator.benchmarks.written import maze_demonstrations, write_maze
 from tests.orchestrator.tiny import Lines
 from tests.sweeps.tiny import TINY_SWEEP, promised, sweep_in, tiny_sweep
 
@@ -174,6 +177,39 @@ def test_another_study_is_refused_and_a_larger_budget_is_not(
     told = promised(done, larger)["study"]
     assert len(told) == 12
     assert told[:10] == expected["study"]
+
+
+def test_what_is_refused_changes_no_file(done: Path) -> None:
+    """By the journal, too: a finished sweep stays finished."""
+    other = tiny_sweep(enqueued=(dict.fromkeys(SWEEP.space, 3),))
+    refused = {"damaged": (SWEEP, StorageError), "enqueued": (other, ChangedError)}
+    journal = done / "sweep" / JOURNAL
+    whole = journal.read_bytes()
+    for name, (sweep, error) in refused.items():
+        journal.write_bytes(b"\0\n" + whole if name == "damaged" else whole)
+        before = {path: path.read_bytes() for path in (done / "sweep").glob("*.json")}
+        with pytest.raises(error):
+            sweep_in(done, sweep)
+        assert {path: path.read_bytes() for path in (done / "sweep").glob("*.json")} == before
+        assert RunDirectory(done / "sweep").written
+
+
+def test_a_study_begun_by_a_killed_command_is_begun_anew(trained: Path) -> None:
+    """Before its sweep was written down, which may be another one now."""
+    (trained / "sweep").mkdir()
+    SweepStudy(tiny_sweep(objectives=("imagined",)), trained / "sweep")
+    sweep_in(trained, tiny_sweep(trials=2, batch=2, confirm=Confirm(best=0)))
+
+
+def test_own_data_that_cannot_be_used_are_told_before_anything_is_claimed(tmp_path: Path) -> None:
+    actions = maze_demonstrations().actions.copy()
+    actions[5] = np.nan
+    file = write_maze(tmp_path / "mine.npz", actions=actions)
+    with pytest.raises(BadDataError, match=r"mine\.npz: actions, row 5: not a finite number"):
+        sweep_in(
+            tmp_path, tiny_sweep(settings=merged(SWEEP.settings, {"data": {"file": str(file)}}))
+        )
+    assert not (tmp_path / "sweep").exists()
 
 
 def test_a_second_sweep_at_once_is_refused(done: Path) -> None:

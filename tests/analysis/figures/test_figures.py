@@ -54,6 +54,20 @@ def test_every_seed_has_a_dot_where_there_are_several(run: Run) -> None:
     assert "seeds" not in legend_of(draw_scores(table.scores, table.labels))
 
 
+def test_dots_are_promised_where_several_seeds_were_played(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not where several were asked for."""
+    monkeypatch.setattr("analysis.figures.save", lambda *_: None)
+    bare = replace(run, training=[], segments=run.segments.query("seed == 0"))
+    for segments, promised in ((run.segments, True), (bare.segments, False)):
+        episodes = episodes_from_segments(segments, run.spec)
+        table = build_table(episodes, run.spec, run.spec.tables[0])
+        scores, profile, *_ = draw_figures(bare, [table], tmp_path)
+        assert ("Small dots" in scores.caption) == promised
+        assert "the share of runs, a task under one seed's models each" in profile.caption
+
+
 def legend_of(figure: Figure) -> list[str]:
     return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
 
@@ -64,6 +78,7 @@ def test_profiles_have_a_panel_for_each_row_of_many_tasks(run: Run) -> None:
     figure = draw_distributions(table)
     assert [axes.get_title() for axes in figure.axes] == ["2 goals", "3 goals", "4 goals"]
     assert [len(axes.lines) for axes in figure.axes] == [4, 4, 4]
+    assert figure.get_supylabel() == "share of runs with a score above τ"
     assert legend_of(figure) == list(table.labels.values())
 
 

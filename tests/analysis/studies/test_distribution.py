@@ -8,6 +8,7 @@ from analysis.episodes import episodes_from_segments
 from analysis.schema import RunSpec
 from analysis.studies.distribution import (
     ONE_SEED,
+    SOME_OF_ONE_SEED,
     distribution_header,
     distribution_lines,
     distribution_note,
@@ -44,10 +45,16 @@ def test_a_task_that_a_seed_lacks_is_left_out(table: Table) -> None:
     lacking = table.task_scores.query(
         "not (row == '4 goals' and seed == 1 and task == 'g0>g1>g2>g3' and method == 'no-stitch')"
     )
-    found = distribution_table(replace(table, task_scores=lacking))
+    lacking_table = replace(table, task_scores=lacking)
+    found = distribution_table(lacking_table)
     tasks = found.set_index(["row", "method"])["tasks"]
     assert tasks["4 goals", "no-stitch"] == 23
     assert tasks["4 goals", "mb-stitch"] == 24
+    kept = lacking.query("row == '4 goals' and method == 'no-stitch' and task != 'g0>g1>g2>g3'")
+    means = found.set_index(["row", "method"])["mean"]
+    assert means["4 goals", "no-stitch"] == pytest.approx(kept["score"].mean())
+    rows = [line[0] for line in distribution_lines(lacking_table, found)]
+    assert rows == ["2 goals (12 tasks)", "3 goals (24 tasks)", "4 goals (23 to 24 tasks)"]
 
 
 def test_as_text(table: Table) -> None:
@@ -69,3 +76,12 @@ def test_one_seed_is_said_to_have_no_interval(segments: pd.DataFrame, spec: RunS
     assert np.isnan(found["ci_low"]).all()
     assert "[" not in "".join(distribution_lines(table, found)[0])
     assert ONE_SEED in distribution_note(found)
+
+
+def test_cells_of_one_seed_beside_others_are_said_to_have_no_interval(table: Table) -> None:
+    assert SOME_OF_ONE_SEED not in distribution_note(distribution_table(table))
+    alone = table.task_scores.query("method != 'no-stitch' or seed == 0")
+    note = distribution_note(distribution_table(replace(table, task_scores=alone)))
+    assert ONE_SEED not in note
+    assert "3 seeds" in note
+    assert note.endswith(SOME_OF_ONE_SEED)

@@ -208,6 +208,8 @@ def test_data_that_cannot_be_used_are_7(
     with pytest.raises(SystemExit) as end:
         main(words)
     assert end.value.code == 7
-    (line,) = [each for each in capsys.readouterr().err.splitlines() if each.startswith("error")]
+    out, err = capsys.readouterr()
+    (line,) = [each for each in err.splitlines() if each.startswith("error")]
     assert line.endswith(f"{file}: actions, row 5: not a finite number")
+    assert out == ""
     assert not (tmp_path / "run" / "spec.json").exists()

@@ -9,10 +9,11 @@ import pytest
 
 from orchestrator.costs.estimate import CostEstimate, estimate, standings
 from orchestrator.costs.expectations import Expectations
-from orchestrator.printing import plan_lines
+from orchestrator.printing import plan_lines, suite_plan_lines
 from orchestrator.spec.methods import SHARED
-from orchestrator.spec.spec import Spec, load_spec, spec_from_plain
+from orchestrator.spec.spec import Spec, TableSpec, load_spec, spec_from_plain
 from orchestrator.spec.structure import Plain, merged, to_plain
+from orchestrator.spec.suite import Part, Suite
 from orchestrator.storage.ledger import Ledger, Outcome, PlayCounts
 from orchestrator.storage.store import Artifact, Store
 from orchestrator.work.plan import Node, Plan, make_plan
@@ -145,6 +146,27 @@ def test_other_seeds_are_alike(spec: Spec, plan: Plan, shared: Ledger, tmp_path:
     assert costs.seconds_evaluation == pytest.approx(2.0 * costs.segments_in_tree)
     assert costs.seconds_training == 7.0 * sum(missing for _, missing in costs.artifacts.values())
     assert "(measured in this store)" in "\n".join(plan_lines(other.spec, costs, 2))
+
+
+def test_parts_that_share_artifacts_have_the_history_of_these(
+    spec: Spec, plan: Plan, shared: Ledger, tmp_path: Path
+) -> None:
+    """A part's own artifacts and blocks come from what another part has counted already."""
+    store = Store(tmp_path)
+    played(shared, plan, PlayCounts(segments=10, successes=10, seconds=20.0))
+    trained(store, plan, 7.0)
+    others = replace(spec, root_seed=1)
+    specs = {"first": replace(others, methods=("no-stitch",)), "second": others}
+    parts = tuple(Part(label, each) for label, each in specs.items())
+    suite = Suite("two", "Two parts", "smoke", parts, (TableSpec("two", "", rows="variant"),))
+    *lines, time, _ = suite_plan_lines(suite, tmp_path, 1)
+    assert time.endswith("(measured in this store)")
+    again = len({*make_plan(specs["first"]).recipes} & {*make_plan(others).recipes})
+    assert f"part second, with {again} artifacts of parts above" in lines
+    costs = estimate(make_plan(others), store, shared, counted=make_plan(specs["first"]).recipes)
+    missing = sum(missing for _, missing in costs.artifacts.values())
+    assert missing == len(make_plan(others).recipes) - again
+    assert costs.seconds_training == 7.0 * missing
 
 
 @pytest.fixture(scope="module")

@@ -1,5 +1,6 @@
 """What Python sees: the promised names, and the examples that use them."""
 
+import os
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -8,7 +9,10 @@ from pathlib import Path
 import pytest
 
 import orchestrator
+from analysis.backends import CHOSEN
 from orchestrator.errors import UsageError
+from orchestrator.spec.spec import Spec
+from tests.orchestrator.tiny import Place
 
 EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"
 
@@ -29,6 +33,18 @@ def test_a_suite_is_no_spec_and_a_spec_is_no_suite() -> None:
         orchestrator.load_spec("table5", "smoke")
     with pytest.raises(UsageError, match="table1 is no suite"):
         orchestrator.load_suite("table1", "smoke")
+
+
+def test_a_library_to_draw_with_is_not_needed(
+    spec: Spec, done: Place, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As of a command; pictures are drawn by processes that get what the user has chosen."""
+    monkeypatch.setenv(CHOSEN, "egl")
+    monkeypatch.setenv("MUJOCO_GL", "osmesa")
+    orchestrator.reproduce(
+        spec, done.out, store=done.store_root, executor="serial", tracking_uri="none"
+    )
+    assert os.environ["MUJOCO_GL"] == "disable"
 
 
 def output(example: str, *words: object) -> str:

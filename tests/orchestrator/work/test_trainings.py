@@ -27,11 +27,16 @@ def recipe(kind: str, seed: int, **config: Any) -> Recipe:
     return Recipe(kind, {"benchmark": "maze", "seed": seed, "config": config})
 
 
+def alone(store: Store, of: Recipe) -> Trainings:
+    """The training of an artifact under the key "key"."""
+    return Trainings(store, {"key": of}, {"key"}, skills=4, _since=0.0)
+
+
 def test_a_training_tells_how_far_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(checkpoints, "SECONDS_BETWEEN_NEWS", 0.0)
     store = Store(tmp_path)
     folder = store.checkpoints("key")
-    trainings = Trainings(store, {"key": recipe("dynamics", 2, updates=20)}, skills=4, _since=0.0)
+    trainings = alone(store, recipe("dynamics", 2, updates=20))
     assert trainings.under_way([], ["key"]) == UnderWay("", 0.0)
     config = DynamicsConfig(updates=20, width=8, members=2, log_every=5)
     with checkpoints_by(Checkpoints(folder).of):
@@ -48,10 +53,8 @@ def test_a_training_tells_how_far_it_is(tmp_path: Path, monkeypatch: pytest.Monk
 def test_the_rate_is_that_since_the_first_look(tmp_path: Path) -> None:
     store = Store(tmp_path)
     folder = store.checkpoints("key")
-    file, trainings = (
-        CheckpointFile(folder / "x", Checkpoints(folder)),
-        Trainings(store, {"key": recipe("agent", 0, updates=5000)}, skills=4, _since=0.0),
-    )
+    file = CheckpointFile(folder / "x", Checkpoints(folder))
+    trainings = alone(store, recipe("agent", 0, updates=5000))
 
     def told(done: int) -> str:
         file._told = -math.inf  # whatever was told just before
@@ -72,7 +75,7 @@ def test_the_share_is_by_what_trainings_take(tmp_path: Path) -> None:
         "short": recipe("agent", 1, updates=1000),
         "waiting": recipe("agent", 2, updates=1000),
     }
-    trainings = Trainings(store, recipes, skills=4, _since=0.0)
+    trainings = Trainings(store, recipes, recipes, skills=4, _since=0.0)
     folder = store.checkpoints("long")
     CheckpointFile(folder / "x", Checkpoints(folder)).tell(1500, 3000, {})
     assert trainings.under_way([], []).share == 0
@@ -80,11 +83,30 @@ def test_the_share_is_by_what_trainings_take(tmp_path: Path) -> None:
     assert trainings.under_way(recipes, []).share == 1.0
 
 
+def test_what_trainings_took_is_known_though_their_data_are_there(tmp_path: Path) -> None:
+    """Of a run that goes on: its data are not made again, and are part of what is alike."""
+    store = Store(tmp_path)
+
+    def recipes(seed: int) -> dict[str, Recipe]:
+        data = Recipe("maze-demonstrations", {"benchmark": "maze", "root_seed": seed})
+        config = {"config": {"updates": 1000}, "benchmark": "maze", "seed": seed}
+        inputs = {"demonstrations": data.key}
+        models = {kind: Recipe(kind, config, inputs) for kind in ("agent", "dynamics")}
+        return {"data": data, **models}
+
+    for of, seconds in zip(recipes(0).values(), (1.0, 90.0, 10.0), strict=True):
+        made = {"kind": of.kind, "params": of.params, "inputs": of.inputs, "seconds": seconds}
+        store.write(of.kind, of.key, Artifact({}, {}), made)
+    now = recipes(1)
+    by_key = {of.key: of for of in now.values()}
+    wanted = {now["agent"].key, now["dynamics"].key}
+    trainings = Trainings(store, by_key, wanted, skills=4, _since=0.0)
+    assert trainings.under_way([now["agent"].key], []).share == pytest.approx(0.9)
+
+
 def test_networks_of_one_skill_each_are_a_training_each(tmp_path: Path) -> None:
     store = Store(tmp_path)
-    trainings = Trainings(
-        store, {"key": recipe("agent", 0, updates=100, multi_task=False)}, 4, _since=0.0
-    )
+    trainings = alone(store, recipe("agent", 0, updates=100, multi_task=False))
     folder = store.checkpoints("key")
     for name, done in (("first", 100), ("second", 50)):
         CheckpointFile(folder / name, Checkpoints(folder)).tell(done, 100, {})

@@ -70,7 +70,8 @@ def test_it_has_what_was_searched_and_found(sweep: RunDirectory, page: str) -> N
     assert "<td>base, rollout.temperature</td>\n<td>1.0</td>" in how
     assert "<td>held-out tasks</td>\n<td>g2 → g3, g3 → g1</td>" in how
     again = unescape(section(page, "made-again-by"))
-    assert f"skillstitch sweep {TINY_SWEEP} --scale paper --trials 10\n" in again
+    assert "skillstitch sweep tiny-sweep.toml --scale paper --trials 10\n" in again
+    assert "artifacts trained" in section(page, "what-it-took")
     assert "<td>git_revision</td>" in section(page, "provenance")
 
 
@@ -85,6 +86,8 @@ def test_the_markdown_says_the_same_without_what_is_of_this_day(sweep: RunDirect
     assert "![Every trial, with its 95 % interval" in text
     assert "git_revision" not in text
     assert "## All trials" not in text
+    assert "## What it took" not in text
+    assert str(TINY_SWEEP.parent) not in text
 
 
 def test_a_terminal_gets_what_comes_before_the_figures(sweep: RunDirectory) -> None:

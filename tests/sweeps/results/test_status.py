@@ -11,7 +11,7 @@ import pytest
 from orchestrator.cli import main
 from orchestrator.storage.rundir import RunDirectory
 from sweeps.journal import JOURNAL, entries
-from sweeps.results.status import ASKED, TOLD, progress_of, state
+from sweeps.results.status import ASKED, TOLD, state, state_of
 from sweeps.space import Dimension
 from sweeps.spec import Confirm
 from sweeps.study import SweepStudy
@@ -118,7 +118,7 @@ def test_the_best_is_the_one_that_the_study_has(trained: Path, objective: str) -
     """More of one, less of the other; the status knows no metrics."""
     sweep = tiny_sweep(trials=4, batch=4, objectives=(objective,), confirm=Confirm(best=0))
     directory = sweep_in(trained, sweep)
-    best = progress_of(directory).best
+    best = state_of(directory).best
     assert best is not None
     assert best["trial"] == SweepStudy(sweep, directory.path).ranked()[0].number
 
@@ -149,7 +149,7 @@ def test_before_anything_was_played(tmp_path: Path, done: Path) -> None:
     folder.mkdir()
     for name in ("spec.json", "sweep.json", "identity.json"):
         (folder / name).write_bytes((done / "sweep" / name).read_bytes())
-    assert progress_of(RunDirectory(folder)).best is None
+    assert state_of(RunDirectory(folder)).best is None
     main(["status", str(folder)])
 
 
