@@ -129,7 +129,7 @@ def test_help_says_the_basics_alone_and_where_the_rest_is(cli: Cli, command: str
         (["plan", "table1", "--methods", "magic"], "unknown method 'magic'; there are no-stitch"),
         (
             ["plan", "table1", "--methods", "mb-stitch[alhpa=1]"],
-            "valid are planner, limit, execute, alpha",
+            "valid are planner, execute, limit, alpha",
         ),
         (["plan", "table1", "--tasks", "g0>g7"], "no skill 'g7'; it has g0, g1, g2, g3"),
         (["plan", "table1", "--executor", "serial"], "--executor"),

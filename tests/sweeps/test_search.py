@@ -44,8 +44,8 @@ def test_no_first_skill_and_no_no_stitch_segment_is_played_again(done: Path) -> 
 
 def test_the_report_counts_what_the_confirmation_took(finished: Path) -> None:
     played = counts(finished)["blocks played"]
-    report = (finished / "sweep" / "report" / "index.md").read_text()
-    assert "- blocks played: " + ", ".join(f"{kind} {n}" for kind, n in played.items()) in report
+    page = (finished / "sweep" / "report" / "index.html").read_text()
+    assert "blocks played: " + ", ".join(f"{kind} {n}" for kind, n in played.items()) in page
 
 
 def test_a_search_keeps_its_report(finished: Path) -> None:

@@ -64,7 +64,7 @@ def test_a_search_in_kitchen_sees_some_of_its_pairs() -> None:
         (
             "mb_stitch.gamma",
             Dimension(low=0.1, high=1.0),
-            "unknown field 'gamma'; valid are planner, limit",
+            "unknown field 'gamma'; valid are planner, execute, limit",
         ),
         ("mb_stich.alpha", Dimension(low=0.1, high=1.0), "begin with one of mb_stitch, agent"),
         ("episodes", Dimension(low=1, high=9), "'episodes' cannot be searched"),

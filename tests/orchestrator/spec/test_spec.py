@@ -190,7 +190,7 @@ def test_methods_take_settings() -> None:
         ("mb-stich", "unknown method 'mb-stich'; there are no-stitch, random-stitch"),
         (
             "mb-stitch[alhpa=1]",
-            "unknown field 'alhpa'; valid are planner, limit",
+            "unknown field 'alhpa'; valid are planner, execute, limit",
         ),
         ("mb-stitch[alpha=big]", "alpha: expected float"),
         ("mb-stitch[alpha=1", "write name or name"),
