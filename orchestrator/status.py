@@ -30,19 +30,29 @@ def status_lines(directory: RunDirectory, store_root: Path | None = None) -> Ite
     yield f"  report     {report if report.is_file() else 'not written yet'}"
 
 
-def _run_lines(directory: RunDirectory, store: Store) -> Iterator[str]:
+def block_counts(directory: RunDirectory) -> tuple[int, int]:
+    """How many blocks are played, and how many failed at least once."""
     ledger = directory.ledger(read_only=True)
     finished, failures = ledger.finished(), ledger.failures()
     ledger.close()
+    return len(finished), len(failures)
+
+
+def failure_lines(failed: int) -> Iterator[str]:
+    if failed:
+        yield f"  failures   {failed} blocks failed at least once"
+
+
+def _run_lines(directory: RunDirectory, store: Store) -> Iterator[str]:
+    played, failed = block_counts(directory)
     planned = directory.read_json(PLANNED)
     if planned is None:
-        yield f"  blocks     {len(finished)} played; how many there will be is not known"
+        yield f"  blocks     {played} played; how many there will be is not known"
     else:
         artifacts = planned["artifacts"]
         built = sum((kind, key) in store for kind, key in artifacts)
         yield f"  artifacts  {built} of {len(artifacts)}"
-        yield f"  blocks     {len(finished)} played of at most {planned['blocks']}"
-    if failures:
-        yield f"  failures   {len(failures)} blocks failed at least once"
+        yield f"  blocks     {played} played of at most {planned['blocks']}"
+    yield from failure_lines(failed)
     for entry in directory.read_json(QUARANTINE) or []:
         yield f"  given up   seed {entry['seed']}, {entry['method']}, {entry['prefix']}"

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from analysis.figures.style import COLOURS, FAINT, INK, MARKERS, new_figure
+from analysis.figures.style import COLOURS, FAINT, INK, MARKERS, hide_unused, new_figure
 from analysis.schema import RunSpec
 
 COLUMNS = 4
@@ -89,10 +89,7 @@ def draw_value_curves(values: Mapping[str, Any], spec: RunSpec) -> Figure:
         axes.set_title(f"{spec.skill_label(skill)}: {_rho(study['rank_correlation'])}")
         axes.grid(color=FAINT, lw=0.4)
         axes.set_axisbelow(True)
-    for axes in grid[len(skills) :]:
-        axes.set_visible(False)
-    for axes in grid[max(0, len(skills) - columns) : len(skills)]:
-        axes.tick_params(labelbottom=True)
+    hide_unused(grid, len(skills), columns)
     figure.supxlabel("progress through the demonstration", fontsize=9)
     figure.supylabel("value", fontsize=9)
     return figure

@@ -3,7 +3,7 @@
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from analysis.figures.style import FAINT, looks, new_figure
+from analysis.figures.style import FAINT, hide_unused, looks, new_figure
 from analysis.tables.distribution import THRESHOLDS
 from analysis.tables.table import Table
 
@@ -29,10 +29,7 @@ def draw_distributions(table: Table) -> Figure:
         axes.set(xlim=(0, 1), ylim=(0, 1.02), xticks=[0, 0.5, 1])
         axes.grid(color=FAINT, lw=0.4)
         axes.set_axisbelow(True)
-    for axes in grid[len(rows) :]:
-        axes.set_visible(False)
-    for axes in grid[max(0, len(rows) - columns) : len(rows)]:
-        axes.tick_params(labelbottom=True)
+    hide_unused(grid, len(rows), columns)
     keys = [
         Line2D([], [], color=look_of[method][0], lw=1.6, label=table.labels[method])
         for method in table.methods

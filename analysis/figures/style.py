@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.figure import Figure
 
 from analysis.figures.drawn import DRAWING
@@ -76,6 +77,14 @@ def house_style() -> Iterator[None]:
 def new_figure(width: float, height: float) -> Figure:
     """A figure in inches that belongs to no window and no global list of figures."""
     return Figure(figsize=(width, height), layout="constrained")
+
+
+def hide_unused(grid: np.ndarray, used: int, columns: int) -> None:
+    """Of panels that share their axes, row by row: the lowest of each column has its numbers."""
+    for axes in grid[used:]:
+        axes.set_visible(False)
+    for axes in grid[max(0, used - columns) : used]:
+        axes.tick_params(labelbottom=True)
 
 
 def save(figure: Figure, folder: Path, name: str, formats: tuple[str, ...] = DRAWING) -> None:

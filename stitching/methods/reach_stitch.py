@@ -75,11 +75,13 @@ class ReachStitch:
         space, execute = self.models.actions, self.settings.execute
         actions = np.zeros((len(states), execute, space.size), dtype=np.float32)
         if rows:
-            known = self._initiation.among_known_objects(states[rows], following)
+            begun = states[rows]
+            nearest = self._initiation.nearest(begun, following)
+            known = self._initiation.among_known_objects(begun, nearest, following)
             score = imagined(known, space, partial(self._imagine, following=following))
             planner, start = self.settings.chosen, None
             if self.settings.steered:
-                start = self._initiation.towards(states[rows], following, planner.horizon)
+                start = self._initiation.towards(begun, nearest, planner.horizon)
             plan = planner.plan(score, [streams[row] for row in rows], space, start)
             actions[rows] = plan.actions[:, :execute].numpy()
         return Proposal(actions, outside.numpy())

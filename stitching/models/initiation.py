@@ -92,23 +92,26 @@ class Initiation:
         # Without the matrix product, which is inexact near zero and taken by the number of rows.
         return torch.cdist(here, there, compute_mode="donot_use_mm_for_euclid_dist")
 
-    def among_known_objects(self, states: torch.Tensor, skill: int) -> torch.Tensor:
+    def among_known_objects(
+        self, states: torch.Tensor, nearest: torch.Tensor, skill: int
+    ) -> torch.Tensor:
         """The same robots among other objects: (n, observation) → (n, observation).
 
-        Those that the skill is not about are as in that state of the set whose pose is nearest.
+        Those that the skill is not about are as in the states that are `nearest`.
         """
         placed = states.clone()
-        placed[:, self.others[skill]] = self._nearest(states, skill)[:, self.others[skill]]
+        placed[:, self.others[skill]] = nearest[:, self.others[skill]]
         return placed
 
-    def towards(self, states: torch.Tensor, skill: int, horizon: int) -> torch.Tensor | None:
-        """`Steering.towards` the nearest pose of the set: (n, horizon, action), or None without."""
+    def towards(
+        self, states: torch.Tensor, nearest: torch.Tensor, horizon: int
+    ) -> torch.Tensor | None:
+        """`Steering.towards` the poses of what is `nearest`: (n, horizon, action), or None."""
         if self.steering is None:
             return None
-        poses = self._nearest(states, skill)[:, self.columns]
-        return self.steering.towards(states, poses, horizon)
+        return self.steering.towards(states, nearest[:, self.columns], horizon)
 
-    def _nearest(self, states: torch.Tensor, skill: int) -> torch.Tensor:
+    def nearest(self, states: torch.Tensor, skill: int) -> torch.Tensor:
         """The states of the set whose poses are nearest: (n, observation) → (n, observation)."""
         return self.states[skill][self._gaps(states, skill).argmin(dim=1)]
 

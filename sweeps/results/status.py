@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from orchestrator.spec.structure import Plain
+from orchestrator.status import block_counts, failure_lines
 from orchestrator.storage.rundir import PLANNED, RunDirectory
 from orchestrator.storage.store import Store
 from sweeps.journal import JOURNAL, entries
@@ -118,12 +119,9 @@ def _block_lines(directory: RunDirectory) -> Iterator[str]:
     if not (directory.path / "ledger.sqlite").is_file():
         yield "  blocks     0 played"
         return
-    ledger = directory.ledger(read_only=True)
-    finished, failures = ledger.finished(), ledger.failures()
-    ledger.close()
-    yield f"  blocks     {len(finished):,} played"
-    if failures:
-        yield f"  failures   {len(failures)} blocks failed at least once"
+    played, failed = block_counts(directory)
+    yield f"  blocks     {played:,} played"
+    yield from failure_lines(failed)
 
 
 def _number(search: SearchState, result: Plain) -> str:

@@ -149,7 +149,7 @@ def test_initiation_sets_know_how_the_robot_moves(benchmark: Benchmark) -> None:
     made = BUILDERS["initiation-sets"].make(recipe, {"demonstrations": as_artifact(data)})
     sets = load_models(benchmark, {"initiation-sets": made}).trained["initiation-sets"]
     here = torch.from_numpy(data.observations[:3])
-    plan = sets.towards(here, 0, 2)
+    plan = sets.towards(here, sets.nearest(here, 0), 2)
     assert (plan is None) == discrete
     if plan is not None:
         assert plan.shape == (3, 2, size)

@@ -124,7 +124,7 @@ def test_it_plans_among_the_objects_of_the_nearest_start() -> None:
     drift = np.zeros((3, 3))
     drift[1, 2] = 0.001  # what y does depends on the object, wrongly where it was never seen
     states = torch.tensor([[2.0, 77.0, 0.05], [4.5, -77.0, -0.05]])
-    known = SETS.among_known_objects(states, 0)
+    known = SETS.among_known_objects(states, SETS.nearest(states, 0), 0)
     assert torch.equal(known, torch.tensor([[2.0, 1.0, 0.05], [4.5, 2.0, -0.05]]))
     assert states[:, 1].tolist() == [77.0, -77.0]
 
